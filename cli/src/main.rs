@@ -1,0 +1,3 @@
+//! The `farfield` command.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Conformance, parity, golden images, the matrix.

@@ -1,0 +1,1 @@
+//! Baseline far fields: all geometry, with and without frustum culling.

@@ -1,0 +1,1 @@
+//! Textured LOD meshes: SVMesh and MVMesh with projective textures.

@@ -1,0 +1,1 @@
+//! Hexagonal cells of viewpoints on the ground plane.

@@ -1,0 +1,1 @@
+//! One cell for every viewpoint, or for a box of them.
