@@ -1,0 +1,143 @@
+//! The backend trait: who carries draw lists out.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Fault;
+use crate::draw::DrawList;
+use crate::id::{Block, TargetId};
+use crate::image::{Picture, SurfaceImage};
+use crate::mesh::ChunkMesh;
+use crate::payload::Payload;
+use crate::scene::Scene;
+
+/// What a block holds, for upload.
+pub enum BlockData<'a> {
+    /// A chunk of an original mesh.
+    Chunk(&'a ChunkMesh),
+    /// A payload.
+    Payload(&'a Payload),
+}
+
+/// What a backend runs on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeviceInfo {
+    /// The backend's registered name.
+    pub backend: String,
+    /// The device and driver, as they name themselves.
+    pub device: String,
+    /// What the device lacks and what is done instead, in words.
+    pub degraded: Vec<String>,
+}
+
+/// What a frame cost, counted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Counted {
+    /// Time on the device, milliseconds; `None` where it has no timestamps.
+    pub gpu_ms: Option<f64>,
+    /// Time from the call to the frame's end on this side, milliseconds.
+    pub wall_ms: f64,
+    /// Original triangles submitted.
+    pub near_triangles: u64,
+    /// Triangles of payloads submitted.
+    pub far_triangles: u64,
+    /// Primitives that reached the clipper, where the device counts them.
+    pub clipped_primitives: Option<u64>,
+}
+
+/// A renderer of draw lists.
+///
+/// Made for one scene: chunk tables, objects, materials and textures are its from the start; triangles and payloads come
+/// and go as blocks. Rendering and reading back are apart, so that reading is never part of what is timed.
+pub trait Backend {
+    /// What it runs on.
+    fn info(&self) -> &DeviceInfo;
+
+    /// Makes a block drawable and returns the bytes that it takes on the device. A block that is there is replaced.
+    ///
+    /// # Errors
+    /// [`Fault::Device`] where the device refuses the memory, [`Fault::Data`] where the block contradicts itself.
+    fn upload(&mut self, block: Block, data: &BlockData<'_>) -> Result<u64, Fault>;
+
+    /// Frees a block; one that is not there is no error.
+    fn release(&mut self, block: Block);
+
+    /// Carries out a frame and waits for its end.
+    ///
+    /// # Errors
+    /// [`Fault::Refused`] where a draw names a block that was not uploaded.
+    fn render(&mut self, list: &DrawList) -> Result<Counted, Fault>;
+
+    /// The planes of a surface target.
+    ///
+    /// # Errors
+    /// [`Fault::Refused`] where no surface pass wrote it.
+    fn read_surface(&mut self, target: TargetId) -> Result<SurfaceImage, Fault>;
+
+    /// The picture of a shaded target.
+    ///
+    /// # Errors
+    /// [`Fault::Refused`] where no shading pass wrote it.
+    fn read_picture(&mut self, target: TargetId) -> Result<Picture, Fault>;
+}
+
+/// Checks that a payload part is consistent: index ranges, lengths, projector and view counts, texel counts.
+///
+/// # Errors
+/// [`Fault::Data`] naming the block and what is wrong.
+pub fn validate(block: Block, data: &BlockData<'_>) -> Result<(), Fault> {
+    use crate::payload::Part;
+    let bad = |cause: String| Err(Fault::Data { place: format!("{block:?}"), cause });
+    let indices = |ix: &[u32], n: usize| match ix.iter().find(|&&i| i as usize >= n) {
+        Some(i) => bad(format!("index {i} of {n} vertices")),
+        None if ix.len() % 3 != 0 => bad(format!("{} indices are not whole triangles", ix.len())),
+        None => Ok(()),
+    };
+    match data {
+        BlockData::Chunk(c) => {
+            let n = c.positions.len();
+            let fits = |len: usize| len == 0 || len == n;
+            if c.normals.len() != n || !fits(c.uvs.len()) || !fits(c.colors.len()) {
+                return bad("vertex attributes differ in length".into());
+            }
+            indices(&c.indices, n)
+        }
+        BlockData::Payload(p) => p.parts.iter().try_for_each(|part| match part {
+            Part::Atlas(a) => {
+                let n = a.size[0] as usize * a.size[1] as usize * a.layers as usize;
+                if a.albedo.len() != n || a.normal.len() != n {
+                    return bad(format!("an atlas of {n} texels holds {} and {}", a.albedo.len(), a.normal.len()));
+                }
+                Ok(())
+            }
+            Part::Mesh(m) | Part::Projected(crate::payload::ProjectedPart { mesh: m, .. }) => {
+                if let Part::Projected(q) = part {
+                    if q.views.len() * 3 != m.indices.len() || q.projectors.len() > 32 {
+                        return bad("one view set a triangle and at most 32 projectors".into());
+                    }
+                    let all = if q.projectors.len() == 32 { u32::MAX } else { (1 << q.projectors.len()) - 1 };
+                    if q.views.iter().any(|v| v & !all != 0) {
+                        return bad("a view set names a projector that is not there".into());
+                    }
+                }
+                if m.normals.len() != m.positions.len() || m.albedo.len() != m.positions.len() {
+                    return bad("vertex attributes differ in length".into());
+                }
+                indices(&m.indices, m.positions.len())
+            }
+        }),
+    }
+}
+
+/// Makes every chunk of the scene resident; returns the bytes taken.
+///
+/// # Errors
+/// As [`Backend::upload`], or what reading the geometry gives.
+pub fn upload_scene(backend: &mut dyn Backend, scene: &Scene) -> Result<u64, Fault> {
+    let mut bytes = 0;
+    for id in scene.mesh_chunk_ids() {
+        let mut done = Ok(0);
+        scene.geometry.with(id, &mut |chunk| done = backend.upload(Block::Chunk(id), &BlockData::Chunk(chunk)))?;
+        bytes += done?;
+    }
+    Ok(bytes)
+}

@@ -1,0 +1,37 @@
+//! Claims: bounds that strategies and partitions state, and that the harness audits.
+
+use serde::{Deserialize, Serialize};
+
+use crate::id::LocalPayload;
+
+/// What a claim bounds. A closed list: for each there is one measurement, taken at held-out viewpoints. Measuring samples,
+/// so it can refute a claim and never prove it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Width of the widest hole (reference hit, candidate background), pixels.
+    HoleWidthPx,
+    /// Original triangles drawn in a frame.
+    NearTriangles,
+}
+
+impl Quantity {
+    /// Its name with its unit, as results files spell it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::HoleWidthPx => "hole_width_px",
+            Self::NearTriangles => "near_triangles",
+        }
+    }
+}
+
+/// A bound, claimed of one payload or of the whole asset or cell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Claim {
+    /// Of what.
+    pub quantity: Quantity,
+    /// Of which payload; `None`: of all together.
+    pub payload: Option<LocalPayload>,
+    /// Never more than this, for any viewpoint of the cell.
+    pub max: f64,
+}

@@ -1,0 +1,238 @@
+//! Exact mode: the cheapest allowed edge, always (Garland and Heckbert 1997, section 4.1).
+//!
+//! Each triangle knows the ids of its three edges, so edges need no lists of their own and no hashing: a vertex's edges are
+//! those of its triangles. After a collapse the survivor's edges are priced anew in one call (with [`Reach::Ring`] its
+//! neighbours' too). An edge that the rules refuse is held and comes back when a triangle at one of its ends has changed.
+//!
+//! What limits it: memory latency. A collapse touches some 12 triangles, 14 vertices and 20 edges that lie where they lay in the
+//! input; in the heap, a price that falls below the current limit moves through about log4 of its length.
+
+use super::mesh::{LiveMesh, Marks};
+use super::queue::Queue;
+use super::rules::Rules;
+use super::{BLOCK, Candidate, Collapsed, Cost, Reach, Settings, resolve};
+
+struct Exact<'a, C: ?Sized> {
+    mesh: LiveMesh,
+    cost: &'a mut C,
+    queue: Queue,
+    /// Edge k of a triangle joins its corners k and k + 1.
+    edges_of: Vec<[u32; 3]>,
+    /// The edge between the vertex at hand and this one, where marked.
+    edge_to: Vec<u32>,
+    marks: Marks,
+    /// Neighbours that the collapse at hand leaves without an edge to the survivor.
+    left: Vec<u32>,
+    prices: Prices,
+}
+
+/// Buffers for one call of [`Cost::costs`].
+#[derive(Default)]
+struct Prices {
+    ids: Vec<u32>,
+    ends: Vec<[u32; 2]>,
+    out: Vec<Candidate>,
+}
+
+impl Prices {
+    fn clear(&mut self) {
+        self.ids.clear();
+        self.ends.clear();
+    }
+
+    fn push(&mut self, edge: u32, a: u32, b: u32) {
+        self.ids.push(edge);
+        self.ends.push([a.min(b), a.max(b)]);
+    }
+
+    fn ask<C: Cost + ?Sized>(&mut self, mesh: &LiveMesh, cost: &mut C) {
+        self.out.clear();
+        self.out.resize(self.ends.len(), Candidate::FORBIDDEN);
+        cost.costs(mesh, &self.ends, &mut self.out);
+    }
+}
+
+pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Settings) -> Collapsed {
+    let mut rules = Rules::new(&mesh, settings);
+    let mut state = Exact::new(mesh, cost, settings.max_cost);
+    let (mut collapses, mut max_cost) = (0, 0f32);
+    while state.mesh.live_triangles() > settings.min_triangles
+        && let Some((edge, price)) = state.queue.pop()
+    {
+        let ends = state.queue.ends(edge);
+        let mut best = [Candidate::FORBIDDEN];
+        state.cost.costs(&state.mesh, &[ends], &mut best);
+        if best[0].cost.is_nan() || best[0].cost == f32::INFINITY || !rules.allow(&state.mesh, ends, best[0].place) {
+            state.queue.hold(edge);
+            continue;
+        }
+        let (from, onto, at) = resolve(&state.mesh, ends, best[0].place);
+        state.cost.collapsed(&state.mesh, from, onto, at);
+        state.merge_edges(edge, from, onto);
+        state.mesh.apply(from, onto, at);
+        state.reprice(onto);
+        collapses += 1;
+        max_cost = max_cost.max(price);
+    }
+    state.mesh.finish(collapses, max_cost)
+}
+
+impl<'a, C: Cost + ?Sized> Exact<'a, C> {
+    fn new(mesh: LiveMesh, cost: &'a mut C, max_cost: f32) -> Self {
+        let vertices = mesh.positions().len();
+        let mut edges_of = vec![[0; 3]; mesh.all_triangles()];
+        let mut ends = Vec::with_capacity(mesh.live_triangles() * 3 / 2 + 16);
+        let mut edge_to = vec![0; vertices];
+        let mut marks = Marks::new(vertices);
+        for v in 0..vertices as u32 {
+            marks.clear();
+            for &t in mesh.triangles_of(v) {
+                for (k, x) in spokes(mesh.corners(t), v) {
+                    if x > v {
+                        if marks.insert(x) {
+                            edge_to[x as usize] = ends.len() as u32;
+                            ends.push([v, x]);
+                        }
+                        edges_of[t as usize][k] = edge_to[x as usize];
+                    }
+                }
+            }
+        }
+        let mut queue = Queue::new(ends, vertices, max_cost);
+        let mut prices = Prices::default();
+        let all = queue.len() as u32;
+        for first in (0..all).step_by(BLOCK) {
+            prices.clear();
+            for e in first..(first + BLOCK as u32).min(all) {
+                let [a, b] = queue.ends(e);
+                prices.push(e, a, b);
+            }
+            prices.ask(&mesh, cost);
+            for (i, &e) in prices.ids.iter().enumerate() {
+                queue.set(e, prices.ends[i], prices.out[i].cost);
+            }
+        }
+        Self { mesh, cost, queue, edges_of, edge_to, marks, left: Vec::new(), prices }
+    }
+
+    /// Gives the edges of `from` over to `onto` before the mesh does so with the triangles: an edge to a common neighbour
+    /// becomes the one that `onto` has already.
+    fn merge_edges(&mut self, edge: u32, from: u32, onto: u32) {
+        let Self { mesh, queue, edges_of, edge_to, marks, left, .. } = self;
+        queue.remove(edge);
+        left.clear();
+        marks.clear();
+        for &t in mesh.triangles_of(onto) {
+            for (k, x) in spokes(mesh.corners(t), onto) {
+                marks.insert(x);
+                edge_to[x as usize] = edges_of[t as usize][k];
+            }
+        }
+        for &t in mesh.triangles_of(from) {
+            for (k, x) in spokes(mesh.corners(t), from) {
+                let e = &mut edges_of[t as usize][k];
+                if x == onto {
+                    continue;
+                }
+                if marks.insert(x) {
+                    edge_to[x as usize] = *e;
+                } else if edge_to[x as usize] != *e {
+                    queue.remove(*e);
+                    *e = edge_to[x as usize];
+                }
+            }
+        }
+        // An edge that only the dying triangles have dies with them. Its third vertex is a common neighbour.
+        marks.clear();
+        for run in [mesh.triangles_of(onto), mesh.triangles_of(from)] {
+            for &t in run {
+                let corners = mesh.corners(t);
+                if !(corners.contains(&from) && corners.contains(&onto)) {
+                    corners.iter().for_each(|&x| _ = marks.insert(x));
+                }
+            }
+        }
+        for &t in mesh.triangles_of(onto) {
+            let corners = mesh.corners(t);
+            if let Some(&w) = corners.iter().find(|&&x| x != from && x != onto)
+                && corners.contains(&from)
+                && !marks.has(w)
+            {
+                queue.remove(edge_to[w as usize]);
+                left.push(w);
+            }
+        }
+    }
+
+    /// Asks the costs of all edges that the collapse onto `v` may have changed, and lets held ones near it try again.
+    fn reprice(&mut self, v: u32) {
+        let Self { mesh, cost, queue, edges_of, marks, left, prices, .. } = self;
+        prices.clear();
+        marks.clear();
+        for &t in mesh.triangles_of(v) {
+            for (k, x) in spokes(mesh.corners(t), v) {
+                if marks.insert(x) {
+                    prices.push(edges_of[t as usize][k], v, x);
+                }
+            }
+        }
+        let own = prices.ids.len();
+        let reach = cost.reach();
+        for i in 0..own + left.len() {
+            let w = if i < own { other(prices.ends[i], v) } else { left[i - own] };
+            if reach == Reach::Ring {
+                for &t in mesh.triangles_of(w) {
+                    for (k, x) in spokes(mesh.corners(t), w) {
+                        if x != v {
+                            prices.push(edges_of[t as usize][k], w, x);
+                        }
+                    }
+                }
+            } else if queue.held_at(w) > 0 {
+                for &t in mesh.triangles_of(w) {
+                    spokes(mesh.corners(t), w).iter().for_each(|&(k, _)| queue.release(edges_of[t as usize][k]));
+                }
+            }
+        }
+        prices.unique(own);
+        prices.ask(mesh, *cost);
+        for (i, &e) in prices.ids.iter().enumerate() {
+            queue.set(e, prices.ends[i], prices.out[i].cost);
+        }
+    }
+}
+
+impl Prices {
+    /// Drops repeated edges from `first` on.
+    fn unique(&mut self, first: usize) {
+        if self.ids.len() == first {
+            return;
+        }
+        let mut tail: Vec<(u32, [u32; 2])> = self.ids.drain(first..).zip(self.ends.drain(first..)).collect();
+        tail.sort_unstable();
+        tail.dedup();
+        for (e, ends) in tail {
+            self.ids.push(e);
+            self.ends.push(ends);
+        }
+    }
+}
+
+/// The end of an edge beside `v`.
+#[inline]
+fn other(ends: [u32; 2], v: u32) -> u32 {
+    if ends[0] == v { ends[1] } else { ends[0] }
+}
+
+/// The two edges of a triangle at its corner `v`, each with its other end.
+#[inline]
+fn spokes(corners: [u32; 3], v: u32) -> [(usize, u32); 2] {
+    let [a, b, c] = corners;
+    if a == v {
+        [(0, b), (2, c)]
+    } else if b == v {
+        [(1, c), (0, a)]
+    } else {
+        [(2, a), (1, b)]
+    }
+}

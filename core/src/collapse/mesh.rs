@@ -1,0 +1,310 @@
+//! A triangle mesh under collapse: corners of triangles, triangles of vertices, positions.
+//!
+//! Flat arrays only. The triangles of a vertex are a run in one long list, laid out vertex by vertex at first; a collapse
+//! writes the survivor's merged run at the list's end, and the list is squeezed when it has doubled. Runs stay contiguous, so
+//! walking a one-ring is a linear read; a squeeze is paid for by the appends since the last one.
+
+use glam::Vec3;
+
+use super::Collapsed;
+use crate::Fault;
+
+/// Marks a dead triangle's first corner.
+const DEAD: u32 = u32::MAX;
+
+/// A mesh under collapse, as costs see it. Ids are those of the input.
+#[derive(Clone, Debug)]
+pub struct LiveMesh {
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    /// Start and length of each vertex's run in `lists`.
+    runs: Vec<[u32; 2]>,
+    lists: Vec<u32>,
+    /// Squeeze `lists` at this length.
+    squeeze_at: usize,
+    locked: Vec<bool>,
+    border: Vec<bool>,
+    remap: Vec<u32>,
+    live: usize,
+    /// A power of two that brings the mesh to about unit size: products of several lengths neither over- nor underflow.
+    unit: f32,
+}
+
+impl LiveMesh {
+    /// Builds the connectivity. `locked` is empty or says for each vertex whether it must neither move nor die.
+    ///
+    /// Triangles that name a vertex twice are dropped.
+    ///
+    /// # Errors
+    /// [`Fault::Data`] where `indices` are no triples, name a vertex that is not there or are more than 2^29 triangles, or where
+    /// `locked` has another length than `positions`.
+    pub fn new(positions: &[Vec3], indices: &[u32], locked: &[bool]) -> Result<Self, Fault> {
+        let bad = |cause: String| Err(Fault::Data { place: "mesh to collapse".into(), cause });
+        let n = positions.len();
+        if !indices.len().is_multiple_of(3) {
+            return bad(format!("{} indices are no triangles", indices.len()));
+        }
+        if indices.len() / 3 > 1 << 29 || n >= DEAD as usize {
+            return bad(format!("{} triangles and {n} vertices are too many", indices.len() / 3));
+        }
+        if let Some(i) = indices.iter().position(|&i| i as usize >= n) {
+            return bad(format!("triangle {} names vertex {} of {n}", i / 3, indices[i]));
+        }
+        if !locked.is_empty() && locked.len() != n {
+            return bad(format!("{} lock flags for {n} vertices", locked.len()));
+        }
+        let proper = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+        let triangles: Vec<[u32; 3]> = indices
+            .chunks_exact(3)
+            .map(|t| [t[0], t[1], t[2]])
+            .map(|t| if proper(&t) { t } else { [DEAD; 3] })
+            .collect();
+        let mut mesh = Self {
+            positions: positions.to_vec(),
+            runs: vec![[0; 2]; n],
+            lists: Vec::with_capacity(indices.len() * 2),
+            squeeze_at: 0,
+            locked: if locked.is_empty() { vec![false; n] } else { locked.to_vec() },
+            border: vec![false; n],
+            remap: (0..n as u32).collect(),
+            live: 0,
+            unit: unit(positions),
+            triangles,
+        };
+        mesh.list_triangles();
+        mesh.find_borders();
+        Ok(mesh)
+    }
+
+    /// Fills `runs` and `lists`: counting sort of corners by vertex.
+    fn list_triangles(&mut self) {
+        let living = || self.triangles.iter().enumerate().filter(|(_, t)| t[0] != DEAD);
+        for (_, t) in living() {
+            t.iter().for_each(|&v| self.runs[v as usize][1] += 1);
+        }
+        let mut end = 0;
+        for r in &mut self.runs {
+            (r[0], end) = (end, end + r[1]);
+            r[1] = 0;
+        }
+        self.lists.resize(end as usize, 0);
+        for (i, t) in living() {
+            for &v in t {
+                let r = &mut self.runs[v as usize];
+                self.lists[(r[0] + r[1]) as usize] = i as u32;
+                r[1] += 1;
+            }
+        }
+        self.live = end as usize / 3;
+        self.squeeze_at = (2 * self.lists.len()).max(1024);
+    }
+
+    /// A vertex is at a border where one of its edges has other than two triangles.
+    fn find_borders(&mut self) {
+        let mut count = vec![0u32; self.positions.len()];
+        for v in 0..self.positions.len() as u32 {
+            let others = |t: &u32| others(self.triangles[*t as usize], v);
+            let run = self.triangles_of(v);
+            run.iter().flat_map(others).for_each(|x| count[x as usize] += 1);
+            let border = run.iter().flat_map(others).any(|x| count[x as usize] != 2);
+            run.iter().flat_map(others).for_each(|x| count[x as usize] = 0);
+            self.border[v as usize] = border;
+        }
+    }
+
+    /// All positions by vertex id, in the input's unit.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// Where a vertex is.
+    #[inline]
+    pub fn position(&self, vertex: u32) -> Vec3 {
+        self.positions[vertex as usize]
+    }
+
+    /// The living triangles of a vertex; none where it is dead or isolated.
+    #[inline]
+    pub fn triangles_of(&self, vertex: u32) -> &[u32] {
+        let [start, len] = self.runs[vertex as usize];
+        &self.lists[start as usize..(start + len) as usize]
+    }
+
+    /// The three vertices of a living triangle.
+    #[inline]
+    pub fn corners(&self, triangle: u32) -> [u32; 3] {
+        self.triangles[triangle as usize]
+    }
+
+    /// Whether the triangle is alive.
+    #[inline]
+    pub fn is_alive(&self, triangle: u32) -> bool {
+        self.triangles[triangle as usize][0] != DEAD
+    }
+
+    /// Number of living triangles.
+    #[inline]
+    pub fn live_triangles(&self) -> usize {
+        self.live
+    }
+
+    /// Whether the vertex must neither move nor die.
+    #[inline]
+    pub fn is_locked(&self, vertex: u32) -> bool {
+        self.locked[vertex as usize]
+    }
+
+    /// Whether an edge of other than two triangles ended at this vertex, or at one that died into it, in the input.
+    #[inline]
+    pub fn is_border(&self, vertex: u32) -> bool {
+        self.border[vertex as usize]
+    }
+
+    /// 1 / (the mesh's size), rounded to a power of two; 1 where there is no finite size. Unit: 1 / the positions' unit.
+    #[inline]
+    pub fn unit(&self) -> f32 {
+        self.unit
+    }
+
+    /// Number of triangles of the input, dead ones included.
+    pub(super) fn all_triangles(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Merges `from` into `onto`, which moves to `at`. They share at least one triangle or none; both live.
+    pub(super) fn apply(&mut self, from: u32, onto: u32, at: Vec3) {
+        if self.lists.len() >= self.squeeze_at {
+            self.squeeze();
+        }
+        let start = self.lists.len();
+        let [first, len] = self.runs[onto as usize];
+        for i in first as usize..(first + len) as usize {
+            let t = self.lists[i];
+            if !self.triangles[t as usize].contains(&from) {
+                self.lists.push(t);
+            }
+        }
+        let [first, len] = self.runs[from as usize];
+        for i in first as usize..(first + len) as usize {
+            let t = self.lists[i];
+            let corners = &mut self.triangles[t as usize];
+            if corners.contains(&onto) {
+                let third = corners.iter().copied().find(|&x| x != from && x != onto);
+                *corners = [DEAD; 3];
+                self.live -= 1;
+                if let Some(w) = third {
+                    self.unlist(w, t);
+                }
+            } else {
+                corners.iter_mut().filter(|x| **x == from).for_each(|x| *x = onto);
+                self.lists.push(t);
+            }
+        }
+        self.runs[onto as usize] = [start as u32, (self.lists.len() - start) as u32];
+        self.runs[from as usize] = [0, 0];
+        self.positions[onto as usize] = at;
+        self.border[onto as usize] |= self.border[from as usize];
+        self.remap[from as usize] = onto;
+    }
+
+    fn unlist(&mut self, vertex: u32, triangle: u32) {
+        let [start, len] = &mut self.runs[vertex as usize];
+        let run = &mut self.lists[*start as usize..(*start + *len) as usize];
+        if let Some(i) = run.iter().position(|&t| t == triangle) {
+            run.copy_within(i + 1.., i);
+            *len -= 1;
+        }
+    }
+
+    fn squeeze(&mut self) {
+        let mut lists = Vec::with_capacity(self.live * 6 + 64);
+        for r in self.runs.iter_mut().filter(|r| r[1] > 0) {
+            let start = lists.len() as u32;
+            lists.extend_from_slice(&self.lists[r[0] as usize..(r[0] + r[1]) as usize]);
+            r[0] = start;
+        }
+        self.lists = lists;
+        self.squeeze_at = (2 * self.lists.len()).max(1024);
+    }
+
+    /// Gives the living triangles out.
+    pub(super) fn finish(mut self, collapses: usize, max_cost: f32) -> Collapsed {
+        // Deaths are chained (a died into b, b into c): follow each chain once, halving it on the way.
+        for v in 0..self.remap.len() {
+            let mut end = v;
+            while self.remap[end] as usize != end {
+                self.remap[end] = self.remap[self.remap[end] as usize];
+                end = self.remap[end] as usize;
+            }
+            self.remap[v] = end as u32;
+        }
+        let mut out = Collapsed { collapses, max_cost, ..Collapsed::default() };
+        out.indices.reserve_exact(self.live * 3);
+        out.triangles.reserve_exact(self.live);
+        for (i, t) in self.triangles.iter().enumerate().filter(|(_, t)| t[0] != DEAD) {
+            out.indices.extend_from_slice(t);
+            out.triangles.push(i as u32);
+        }
+        out.positions = self.positions;
+        out.remap = self.remap;
+        out
+    }
+}
+
+/// The two vertices of a triangle beside `v`, in the triangle's order beginning after `v`.
+#[inline]
+pub(super) fn others(t: [u32; 3], v: u32) -> [u32; 2] {
+    if t[0] == v {
+        [t[1], t[2]]
+    } else if t[1] == v {
+        [t[2], t[0]]
+    } else {
+        [t[0], t[1]]
+    }
+}
+
+fn unit(positions: &[Vec3]) -> f32 {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for p in positions.iter().filter(|p| p.is_finite()) {
+        (low, high) = (low.min(*p), high.max(*p));
+    }
+    // f64: the box of coordinates at the f32 limits has no f32 size.
+    let size = (high.as_dvec3() - low.as_dvec3()).max_element();
+    if size.is_finite() && size > 0.0 { (-size.log2().ceil()).clamp(-120.0, 120.0).exp2() as f32 } else { 1.0 }
+}
+
+/// A set of vertices that is emptied in O(1).
+pub(super) struct Marks {
+    now: u32,
+    of: Vec<u32>,
+}
+
+impl Marks {
+    pub(super) fn new(n: usize) -> Self {
+        Self { now: 0, of: vec![0; n] }
+    }
+
+    pub(super) fn clear(&mut self) {
+        if self.now == u32::MAX {
+            self.of.fill(0);
+            self.now = 0;
+        }
+        self.now += 1;
+    }
+
+    /// Returns whether it was not there yet.
+    #[inline]
+    pub(super) fn insert(&mut self, v: u32) -> bool {
+        std::mem::replace(&mut self.of[v as usize], self.now) != self.now
+    }
+
+    #[inline]
+    pub(super) fn remove(&mut self, v: u32) {
+        self.of[v as usize] = 0;
+    }
+
+    #[inline]
+    pub(super) fn has(&self, v: u32) -> bool {
+        self.of[v as usize] == self.now
+    }
+}

@@ -1,0 +1,139 @@
+//! Payloads: what bakes write, stores keep, backends upload and draw lists name.
+
+use glam::{DVec3, Mat4, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::Aabb;
+use crate::id::LocalPayload;
+
+/// The unit of loading: a bundle of parts that come and go together. Positions in its parts are relative to `origin`, so
+/// that they keep their precision wherever the payload stands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Payload {
+    /// Where its positions start from, local frame.
+    pub origin: DVec3,
+    /// Its box in the local frame.
+    pub bounds: Aabb,
+    /// What it holds.
+    pub parts: Vec<Part>,
+}
+
+/// A part of a payload. A closed list: a backend draws every kind. Parts hold albedo and normals, never lit colour.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Part {
+    /// Plain triangles.
+    Mesh(MeshPart),
+    /// Triangles textured by projection.
+    Projected(ProjectedPart),
+    /// Texels for projected parts.
+    Atlas(AtlasPart),
+}
+
+/// Triangles with an albedo and a normal a vertex.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeshPart {
+    /// Positions relative to the payload's origin.
+    pub positions: Vec<Vec3>,
+    /// Unit normals, local frame.
+    pub normals: Vec<Vec3>,
+    /// sRGB albedo.
+    pub albedo: Vec<[u8; 4]>,
+    /// Three indices a triangle, counter-clockwise seen from in front.
+    pub indices: Vec<u32>,
+    /// Drawn from behind too, with the normal turned to the eye.
+    pub two_sided: bool,
+}
+
+/// A mesh whose triangles take albedo and normal from the projectors that see them.
+///
+/// Of a triangle's set of projectors the drawing backend takes, pixel by pixel, none (then the vertices' attributes serve),
+/// the one, or the two whose directions from the surface point come nearest to the eye's, blended (see
+/// [`ProjectedPart::blend`]).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ProjectedPart {
+    /// The mesh, with attributes for triangles that no projector sees.
+    pub mesh: MeshPart,
+    /// One bit set a triangle, bit i for `projectors[i]`; at most 32 projectors.
+    pub views: Vec<u32>,
+    /// Where its texels come from.
+    pub projectors: Vec<Projector>,
+}
+
+/// A slide projector: it throws a rectangle of an atlas layer from a point.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Projector {
+    /// From positions relative to the payload's origin to (u w, v w, depth, w), u and v in texels of the layer.
+    pub matrix: Mat4,
+    /// Where it stands, relative to the payload's origin.
+    pub eye: Vec3,
+    /// The payload of the same asset whose first part is the atlas.
+    pub atlas: LocalPayload,
+    /// The atlas layer.
+    pub layer: u32,
+    /// The rectangle of texels it owns: x, y, width, height. Look-ups are kept half a texel within it.
+    pub rect: [u32; 4],
+}
+
+/// Layers of texels, all of one size: albedo (sRGB, alpha 255 where a surface was captured) and normals (n / 2 + 1/2 in
+/// rgb). Rows run from the top.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct AtlasPart {
+    /// Width and height of a layer, texels.
+    pub size: [u32; 2],
+    /// Number of layers.
+    pub layers: u32,
+    /// sRGB albedo, layer by layer.
+    pub albedo: Vec<[u8; 4]>,
+    /// Normals as n / 2 + 1/2, layer by layer.
+    pub normal: Vec<[u8; 4]>,
+}
+
+impl ProjectedPart {
+    /// The two projectors that show a surface point to an eye, and the weight of the first: w = a2 / (a1 + a2), where a1 and
+    /// a2 are 1 - cos of the angles at the point between the eye and each projector (so w is 1 where the eye stands in the
+    /// first, 1/2 half-way; view-dependent texture mapping, Debevec et al. 1998). `None` when the set is empty.
+    ///
+    /// `point` and `eye` are relative to the payload's origin. The shaders do the same arithmetic.
+    pub fn blend(projectors: &[Projector], set: u32, point: Vec3, eye: Vec3) -> Option<(usize, usize, f32)> {
+        let to_eye = (eye - point).normalize_or_zero();
+        let (mut best, mut second) = ((f32::INFINITY, 0), (f32::INFINITY, 0));
+        for (i, p) in projectors.iter().enumerate().filter(|(i, _)| set >> i & 1 == 1) {
+            let a = 1.0 - to_eye.dot((p.eye - point).normalize_or_zero());
+            if a < best.0 {
+                (best, second) = ((a, i), best);
+            } else if a < second.0 {
+                second = (a, i);
+            }
+        }
+        match (best.0.is_finite(), second.0.is_finite()) {
+            (false, _) => None,
+            (true, false) => Some((best.1, best.1, 1.0)),
+            (true, true) => Some((best.1, second.1, (second.0 + 1e-9) / (best.0 + second.0 + 2e-9))),
+        }
+    }
+}
+
+impl Payload {
+    /// Triangles in all its parts.
+    pub fn triangles(&self) -> u64 {
+        self.parts
+            .iter()
+            .map(|p| match p {
+                Part::Mesh(m) => m.indices.len() as u64 / 3,
+                Part::Projected(m) => m.mesh.indices.len() as u64 / 3,
+                Part::Atlas(_) => 0,
+            })
+            .sum()
+    }
+
+    /// Bytes of its texels.
+    pub fn texture_bytes(&self) -> u64 {
+        self.parts
+            .iter()
+            .map(|p| match p {
+                Part::Atlas(a) => 4 * (a.albedo.len() + a.normal.len()) as u64,
+                _ => 0,
+            })
+            .sum()
+    }
+}

@@ -1,0 +1,220 @@
+//! Putting a scene together.
+
+use glam::{DAffine3, DVec3, Vec3};
+
+use super::{CutMesh, InMemory, MAX_CHUNK_TRIANGLES, Material, MeshInfo, Object, PlacedChunk, Scene, Texture, cut};
+use crate::id::{MeshChunkId, MeshId, ObjectId};
+use crate::mesh::TriangleMesh;
+use crate::octree::Octree;
+use crate::{Aabb, Fault};
+
+/// A mesh and where it stands in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct Placement {
+    /// Which mesh.
+    pub mesh: MeshId,
+    /// From mesh space to the world.
+    pub transform: DAffine3,
+}
+
+/// Collects meshes, placements, materials and textures, then builds the scene.
+#[derive(Default)]
+pub struct SceneBuilder {
+    /// Materials, named by index in the meshes' sections.
+    pub materials: Vec<Material>,
+    /// Textures, named by index in the materials.
+    pub textures: Vec<Texture>,
+    meshes: Vec<(String, CutMesh)>,
+    placements: Vec<Placement>,
+}
+
+impl SceneBuilder {
+    /// Adds a mesh.
+    ///
+    /// # Errors
+    /// [`Fault::Data`] naming the mesh, where an index, a section, an attribute's length or a position is wrong.
+    pub fn mesh(&mut self, name: &str, mesh: TriangleMesh) -> Result<MeshId, Fault> {
+        check(&mesh).map_err(|cause| Fault::Data { place: format!("mesh \"{name}\""), cause })?;
+        self.meshes.push((name.to_owned(), cut(mesh, MAX_CHUNK_TRIANGLES)));
+        Ok(MeshId(self.meshes.len() as u32 - 1))
+    }
+
+    /// Places a mesh.
+    pub fn place(&mut self, placement: Placement) {
+        self.placements.push(placement);
+    }
+
+    /// Builds the scene. Its local frame starts in the middle of everything placed, at the lowest point's height.
+    ///
+    /// # Errors
+    /// [`Fault::Data`] where a placement is not finite or names no mesh, or a section names no material.
+    pub fn build(self) -> Result<Scene, Fault> {
+        let place = |i: usize| format!("object {i}");
+        let mut infos = vec![];
+        let mut geometry = vec![];
+        let mut hash = blake3::Hasher::new();
+        for (name, m) in self.meshes {
+            let bounds = m.infos.iter().fold(Aabb::EMPTY, |b, c| b.union(c.bounds));
+            let triangles = m.infos.iter().map(|c| u64::from(c.triangles)).sum();
+            if let Some(c) = m.infos.iter().find(|c| c.material.index() >= self.materials.len()) {
+                return Err(Fault::Data {
+                    place: format!("mesh \"{name}\""),
+                    cause: format!("material {} of {}", c.material.0, self.materials.len()),
+                });
+            }
+            m.chunks.iter().for_each(|c| {
+                hash.update(bytemuck::cast_slice(&c.positions));
+                hash.update(bytemuck::cast_slice(&c.normals));
+                hash.update(bytemuck::cast_slice(&c.uvs));
+                hash.update(bytemuck::cast_slice(&c.colors));
+                hash.update(bytemuck::cast_slice(&c.indices));
+            });
+            infos.push(MeshInfo { name, bounds, triangles, vertex_ids: m.vertex_ids, chunks: m.infos });
+            geometry.push(m.chunks);
+        }
+        for m in &self.materials {
+            hash.update(serde_json::to_string(m).unwrap_or_default().as_bytes());
+        }
+        for t in &self.textures {
+            hash.update(bytemuck::cast_slice(&t.size));
+            hash.update(bytemuck::cast_slice(&t.rgba));
+        }
+
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for (i, p) in self.placements.iter().enumerate() {
+            let mesh = infos.get(p.mesh.index()).ok_or_else(|| Fault::Data {
+                place: place(i),
+                cause: format!("mesh {} of {}", p.mesh.0, infos.len()),
+            })?;
+            if mesh.bounds.is_empty() {
+                continue;
+            }
+            for c in mesh.bounds.corners() {
+                let w = p.transform.transform_point3(c.as_dvec3());
+                (low, high) = (low.min(w), high.max(w));
+            }
+        }
+        let empty = !low.cmple(high).all();
+        let origin =
+            if empty { DVec3::ZERO } else { DVec3::new(0.5 * (low.x + high.x), low.y, 0.5 * (low.z + high.z)) };
+        if !origin.is_finite() || !(high - low).as_vec3().is_finite() && !empty {
+            return Err(Fault::Data { place: "placements".into(), cause: "the scene's extent is not finite".into() });
+        }
+
+        let (mut objects, mut chunks) = (vec![], vec![]);
+        for (i, p) in self.placements.iter().enumerate() {
+            let mesh = &infos[p.mesh.index()];
+            let placement = DAffine3::from_translation(-origin) * p.transform;
+            if !placement.is_finite() || placement.matrix3.determinant() == 0.0 {
+                return Err(Fault::Data { place: place(i), cause: "its transform is not finite or flattens it".into() });
+            }
+            let first = chunks.len() as u32;
+            for (k, c) in mesh.chunks.iter().enumerate() {
+                chunks.push(PlacedChunk {
+                    object: ObjectId(i as u32),
+                    source: MeshChunkId { mesh: p.mesh, chunk: k as u32 },
+                    triangles: c.triangles,
+                    bounds: c.bounds.transformed(&placement),
+                });
+            }
+            let bounds = chunks[first as usize..].iter().fold(Aabb::EMPTY, |b, c: &PlacedChunk| b.union(c.bounds));
+            hash.update(&p.mesh.0.to_le_bytes());
+            hash.update(bytemuck::cast_slice(&placement.to_cols_array()));
+            objects.push(Object { mesh: p.mesh, placement, chunks: first..chunks.len() as u32, bounds });
+        }
+        let bounds = objects.iter().fold(Aabb::EMPTY, |b, o| b.union(o.bounds));
+        let boxes: Vec<(Aabb, u32)> = chunks.iter().map(|c: &PlacedChunk| (c.bounds, c.triangles)).collect();
+        Ok(Scene {
+            origin,
+            bounds: if bounds.is_empty() { Aabb::of([Vec3::ZERO]) } else { bounds },
+            meshes: infos,
+            objects,
+            octree: Octree::over(&boxes, 20_000),
+            chunks,
+            materials: self.materials,
+            textures: self.textures,
+            digest: *hash.finalize().as_bytes(),
+            geometry: Box::new(InMemory(geometry)),
+        })
+    }
+}
+
+fn check(m: &TriangleMesh) -> Result<(), String> {
+    let n = m.positions.len();
+    for (what, len) in [("normals", m.normals.len()), ("uvs", m.uvs.len()), ("colours", m.colors.len())] {
+        if len != 0 && len != n {
+            return Err(format!("{len} {what} for {n} vertices"));
+        }
+    }
+    if m.indices.len() % 3 != 0 {
+        return Err(format!("{} indices are not whole triangles", m.indices.len()));
+    }
+    if let Some((i, v)) = m.indices.iter().enumerate().find(|&(_, &v)| v as usize >= n) {
+        return Err(format!("triangle {} names vertex {v} of {n}", i / 3));
+    }
+    if let Some(i) = m.positions.iter().position(|p| !p.is_finite()) {
+        return Err(format!("vertex {i} is not finite"));
+    }
+    let mut at = 0;
+    for (r, _) in &m.sections {
+        if r.start != at || r.end < r.start || r.end % 3 != 0 {
+            return Err(format!("sections do not join at index {at}"));
+        }
+        at = r.end;
+    }
+    if at as usize != m.indices.len() {
+        return Err(format!("sections cover {at} of {} indices", m.indices.len()));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::id::MaterialId;
+
+    fn triangle() -> TriangleMesh {
+        TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            indices: vec![0, 1, 2],
+            sections: vec![(0..3, MaterialId(0))],
+            ..Default::default()
+        }
+    }
+    fn scene_at(offset: DVec3) -> Scene {
+        let mut b = SceneBuilder { materials: vec![Material::default()], ..Default::default() };
+        let mesh = b.mesh("triangle", triangle()).unwrap();
+        for x in [0.1, 7.3] {
+            b.place(Placement { mesh, transform: DAffine3::from_translation(offset + DVec3::X * x) });
+        }
+        b.build().unwrap()
+    }
+
+    #[test]
+    fn a_scene_far_away_is_the_same_scene() {
+        let (home, away) = (scene_at(DVec3::ZERO), scene_at(DVec3::splat(1e7)));
+        assert!((away.origin - home.origin - DVec3::splat(1e7)).length() < 1e-6);
+        for (a, b) in home.chunks.iter().zip(&away.chunks) {
+            assert!(a.bounds.min.distance(b.bounds.min) < 1e-6 && a.bounds.max.distance(b.bounds.max) < 1e-6);
+        }
+    }
+
+    #[test]
+    fn wrong_meshes_are_refused_with_their_cause() {
+        let refused = |change: &dyn Fn(&mut TriangleMesh)| {
+            let mut m = triangle();
+            change(&mut m);
+            SceneBuilder::default().mesh("bad", m).unwrap_err().to_string()
+        };
+        assert_eq!(refused(&|m| m.indices[1] = 9), "mesh \"bad\": triangle 0 names vertex 9 of 3");
+        assert_eq!(refused(&|m| m.positions[2].x = f32::NAN), "mesh \"bad\": vertex 2 is not finite");
+        assert_eq!(refused(&|m| m.sections.clear()), "mesh \"bad\": sections cover 0 of 3 indices");
+        assert_eq!(refused(&|m| m.normals.push(Vec3::X)), "mesh \"bad\": 1 normals for 3 vertices");
+    }
+
+    #[test]
+    fn an_empty_scene_is_a_scene() {
+        let s = SceneBuilder::default().build().unwrap();
+        assert_eq!((s.triangles(), s.chunks.len()), (0, 0));
+    }
+}
