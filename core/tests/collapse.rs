@@ -117,7 +117,10 @@ fn check_sound(input: &Mesh, locked: &[bool], out: &Collapsed) {
     for (t, &source) in out.indices.chunks_exact(3).zip(&out.triangles) {
         assert!(t[0] != t[1] && t[1] != t[2] && t[2] != t[0], "degenerate triangle {t:?}");
         let source = &input.1[source as usize * 3..][..3];
-        assert!(t.iter().zip(source).all(|(v, s)| out.remap[*s as usize] == *v), "{t:?} is not what became of {source:?}");
+        assert!(
+            t.iter().zip(source).all(|(v, s)| out.remap[*s as usize] == *v),
+            "{t:?} is not what became of {source:?}"
+        );
     }
     for v in 0..n {
         assert_eq!(out.remap[out.remap[v] as usize], out.remap[v], "a survivor is alive");
@@ -130,7 +133,7 @@ fn check_sound(input: &Mesh, locked: &[bool], out: &Collapsed) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
     fn exact_mode_is_the_brute_force_greedy_for_a_weighted_cost(seed in 0u64..1_000_000) {
@@ -162,7 +165,7 @@ proptest! {
         let settings = Settings { mode: Mode::Batched, ..any_settings(&mut rng) };
         let mesh = LiveMesh::new(&positions, &indices, &locked).unwrap();
         let mut cost = Weighted::new(positions.len(), seed % 2 == 1, &mut rng);
-        let got = collapse(mesh, &mut cost.clone(), &settings);
+        let got = collapse(mesh, &mut cost, &settings);
         check_sound(&(positions.clone(), indices), &locked, &got);
         // What is left is done: a second run finds nothing to do. (Borders are found anew, so not with the link condition.)
         if !settings.link_condition {
@@ -286,10 +289,14 @@ fn flat_and_collinear_neighbourhoods_collapse_for_nothing() {
             // The corners of the rectangle stay, and with them two triangles.
             let out = run(&flat, 1e-4);
             assert!(out.triangles.len() <= 4, "{mode:?} {placement:?}: {}", out.triangles.len());
-            let area: f32 = out.indices.chunks_exact(3).map(|t| {
-                let [a, b, c] = [0, 1, 2].map(|k| out.positions[t[k] as usize]);
-                (b - a).cross(c - a).z / 2.0
-            }).sum();
+            let area: f32 = out
+                .indices
+                .chunks_exact(3)
+                .map(|t| {
+                    let [a, b, c] = [0, 1, 2].map(|k| out.positions[t[k] as usize]);
+                    (b - a).cross(c - a).z / 2.0
+                })
+                .sum();
             assert!((area - 108.0).abs() < 0.01, "{area}");
             assert!(run(&line, 1e-4).triangles.len() <= 4);
         }

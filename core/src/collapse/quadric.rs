@@ -82,8 +82,7 @@ impl Quadric {
     #[inline]
     fn times(&self, x: Vec3) -> Vec3 {
         let Vec3 { x: yz, y: xz, z: xy } = self.mixed;
-        self.diagonal * x
-            + Vec3::new(xy * x.y + xz * x.z, xy * x.x + yz * x.z, xz * x.x + yz * x.y)
+        self.diagonal * x + Vec3::new(xy * x.y + xz * x.z, xy * x.x + yz * x.z, xz * x.x + yz * x.y)
     }
 
     #[inline]

@@ -122,11 +122,13 @@ impl Queue {
     }
 
     fn refill(&mut self) {
-        let (edges, mut seen) = (&mut self.edges, Vec::with_capacity(self.stock.len()));
-        // Each edge once: NOWHERE marks the ones already seen.
-        for &e in &self.stock {
-            if std::mem::replace(&mut edges[e as usize].slot, NOWHERE) == STOCK {
-                seen.push(Entry { cost: edges[e as usize].cost, edge: e });
+        let mut seen = Vec::with_capacity(self.stock.len());
+        for &edge in &self.stock {
+            let e = &mut self.edges[edge as usize];
+            if e.slot == STOCK {
+                seen.push(Entry { cost: e.cost, edge });
+                // Once only, should the stock name it again.
+                e.slot = NOWHERE;
             }
         }
         self.stock.clear();

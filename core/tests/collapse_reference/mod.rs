@@ -9,14 +9,14 @@ use rand_chacha::ChaCha8Rng;
 
 /// Length times weights, and the turn between vertex normals with `Reach::Ring`; the lighter vertex dies.
 #[derive(Clone)]
-pub struct Weighted {
+pub(super) struct Weighted {
     weights: Vec<f32>,
     reach: Reach,
 }
 
 impl Weighted {
     /// Random weights; about one vertex in ten can only be joined by lighter ones.
-    pub fn new(vertices: usize, ring: bool, rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn new(vertices: usize, ring: bool, rng: &mut ChaCha8Rng) -> Self {
         let weights = (0..vertices).map(|_| rng.random_range(0.05..0.5)).collect();
         Self { weights, reach: if ring { Reach::Ring } else { Reach::Ends } }
     }
@@ -61,7 +61,7 @@ impl Cost for Weighted {
 }
 
 /// Exact greedy collapse in O(collapses * edges * triangles).
-pub fn reference(
+pub(super) fn reference(
     positions: &[Vec3],
     indices: &[u32],
     locked: &[bool],
