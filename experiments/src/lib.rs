@@ -1,1 +1,2 @@
 //! From an experiment file to a report.
+pub mod generate;

@@ -1,0 +1,57 @@
+//! Scenes made from nothing but a seed, for those who have no models at hand.
+//!
+//! [`park`] is a statuary park after the one that system T was measured on: eight kinds of procedurally sculpted statues with
+//! that scene's triangle counts, sizes, numbers and area, at any total from 100,000 to 64 million triangles; or the same
+//! park from mesh files, fitted to the same boxes ([`fit`]). Everything here is a pure function of its settings: the same
+//! settings give the same bytes, whatever the number of threads.
+
+mod creatures;
+mod figures;
+pub mod fit;
+mod kind;
+mod march;
+mod noise;
+pub mod park;
+mod quadrupeds;
+mod remesh;
+mod sculpt;
+mod sdf;
+mod shade;
+
+pub use fit::{Up, fit_to_box};
+pub use kind::{Kind, PAPER_MODELS, PaperModel};
+pub use park::{PARK_2M, PARK_4M, PARK_8M, ParkScene, ParkSettings, Placement, layout, park};
+pub use sculpt::{LEAST_TRIANGLES, MOST_TRIANGLES, sculpt};
+
+/// Why a scene could not be generated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GenerateError {
+    /// A park's total is out of range.
+    #[error("a park of {asked} triangles: the total must be between {least} and {most}")]
+    Total {
+        /// What was asked for.
+        asked: u64,
+        /// Least total.
+        least: u64,
+        /// Greatest total.
+        most: u64,
+    },
+    /// A statue's triangle count is out of range.
+    #[error("a {kind} of {asked} triangles: the count must be between {least} and {most}")]
+    Triangles {
+        /// Name of the kind.
+        kind: &'static str,
+        /// What was asked for.
+        asked: u32,
+        /// Least count.
+        least: u32,
+        /// Greatest count.
+        most: u32,
+    },
+    /// A mesh cannot be fitted to a box.
+    #[error("the mesh cannot be fitted to a box: {cause}")]
+    Fit {
+        /// What is wrong with it.
+        cause: &'static str,
+    },
+}

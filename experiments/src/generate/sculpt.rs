@@ -1,0 +1,140 @@
+//! One statue: distance field, mesh of an exact triangle count, normals, colours, the paper's box.
+//!
+//! The field is meshed on a lattice that gives somewhat fewer triangles than asked for, evened out, and split up to the very
+//! count. Relief finer than the mesh can hold is left out, so that every count gets as much detail as it can carry. About
+//! 2 s for 200,000 triangles on one core.
+
+use glam::{Mat3, Vec3};
+
+use farfield_core::mesh::TriangleMesh;
+
+use super::kind::Kind;
+use super::march::{Raw, march};
+use super::sdf::Solid;
+use super::shade::{Palette, color};
+use super::{GenerateError, creatures, figures, quadrupeds, remesh};
+
+/// Fewest triangles of a statue: below that legs and horns cannot be told.
+pub const LEAST_TRIANGLES: u32 = 200;
+/// Most triangles of a statue: the lattice takes some 10 bytes a triangle and the square root of the count on top.
+pub const MOST_TRIANGLES: u32 = 4_000_000;
+
+/// Share of the triangles that the lattice gives; the rest comes from splitting edges where the surface bends.
+const LATTICE_SHARE: f32 = 0.8;
+
+/// Sculpts a statue of `triangles` triangles (one less where that is odd: a closed mesh has an even number), closed, oriented
+/// outward, in the paper's box ([`Kind::size`]): on y = 0, centred in x and z, with unit normals and sRGB vertex colours.
+/// `seed` varies relief, locks, folds and colour.
+///
+/// # Errors
+/// If the count is out of [`LEAST_TRIANGLES`]..=[`MOST_TRIANGLES`].
+pub fn sculpt(kind: Kind, triangles: u32, seed: u64) -> Result<TriangleMesh, GenerateError> {
+    if !(LEAST_TRIANGLES..=MOST_TRIANGLES).contains(&triangles) {
+        return Err(GenerateError::Triangles {
+            kind: kind.name(),
+            asked: triangles,
+            least: LEAST_TRIANGLES,
+            most: MOST_TRIANGLES,
+        });
+    }
+    let seed = (seed ^ seed >> 32) as u32 ^ (kind as u32 + 1).wrapping_mul(0x9e37_79b9);
+    let (solid, mut raw) = lattice(kind, triangles, seed);
+    remesh::relax(&mut raw, &solid, 6);
+    remesh::split_to(&mut raw, &solid, triangles as usize & !1);
+    remesh::relax(&mut raw, &solid, 2);
+    remesh::project(&mut raw, &solid, 3);
+    Ok(finish(kind, &solid, raw, seed))
+}
+
+/// The field at a spacing whose mesh has at most `triangles` triangles, but not much fewer, and that mesh.
+fn lattice(kind: Kind, triangles: u32, seed: u32) -> (Solid, Raw) {
+    let wanted = LATTICE_SHARE * triangles as f32;
+    let size = kind.size();
+    // First guess: a surface of half the box's, three triangles a squared spacing.
+    let mut spacing = (3.0 * (size.x * size.y + size.y * size.z + size.z * size.x) / wanted).sqrt();
+    let (mut solid, mut raw) = mesh_at(kind, spacing, seed);
+    for _ in 0..6 {
+        let ratio = raw.triangles.len() as f32 / wanted;
+        if (0.8..=1.0 / LATTICE_SHARE).contains(&ratio) && raw.triangles.len() <= triangles as usize & !1 {
+            break;
+        }
+        // Triangles go with the inverse square of the spacing. An empty mesh has a lattice far too coarse.
+        spacing *= ratio.sqrt().clamp(0.5, 2.0);
+        (solid, raw) = mesh_at(kind, spacing, seed);
+    }
+    // Never more than asked for, however the count jumps between spacings.
+    while raw.triangles.len() > triangles as usize & !1 {
+        spacing *= 1.03;
+        (solid, raw) = mesh_at(kind, spacing, seed);
+    }
+    (solid, raw)
+}
+
+fn mesh_at(kind: Kind, spacing: f32, seed: u32) -> (Solid, Raw) {
+    let make = match kind {
+        Kind::Dragon => creatures::dragon,
+        Kind::Bunny => creatures::bunny,
+        Kind::Statue => figures::statue,
+        Kind::Cattle => quadrupeds::cattle,
+        Kind::Horse => quadrupeds::horse,
+        Kind::Easter => figures::easter,
+        Kind::Camel => quadrupeds::camel,
+        Kind::Venus => figures::venus,
+    };
+    let solid = make(spacing, seed);
+    let raw = march(&solid);
+    (solid, raw)
+}
+
+/// Colours, normals, and the box: a turn about the vertical and a slight stretch to the paper's width, depth and height.
+fn finish(kind: Kind, solid: &Solid, raw: Raw, seed: u32) -> TriangleMesh {
+    let normals = remesh::normals(&raw, solid);
+    let lows = raw.positions.iter().map(|p| p.y).fold(f32::MAX, f32::min);
+    let highs = raw.positions.iter().map(|p| p.y).fold(f32::MIN, f32::max);
+    let palette = palette(kind);
+    let colors = raw
+        .positions
+        .iter()
+        .zip(&normals)
+        .map(|(&p, &n)| color(solid, &palette, p, n, (lows, highs - lows), seed))
+        .collect();
+    let turn = Mat3::from_rotation_y(yaw_deg(kind).to_radians());
+    let turned: Vec<Vec3> = raw.positions.iter().map(|&p| turn * p).collect();
+    let lo = turned.iter().copied().reduce(Vec3::min).unwrap_or_default();
+    let hi = turned.iter().copied().reduce(Vec3::max).unwrap_or_default();
+    let stretch = kind.size() / (hi - lo);
+    let foot = Vec3::new(0.5 * (lo.x + hi.x), lo.y, 0.5 * (lo.z + hi.z));
+    TriangleMesh {
+        positions: turned.iter().map(|&p| (p - foot) * stretch).collect(),
+        // A normal goes with the inverse transpose of a stretch.
+        normals: normals.iter().map(|&n| ((turn * n) / stretch).normalize()).collect(),
+        uvs: Vec::new(),
+        colors,
+        indices: raw.triangles.into_iter().flatten().collect(),
+        sections: Vec::new(),
+    }
+}
+
+/// Turn, degrees, that gives the sculpture the proportions of the paper's box: horse and bull stand across it.
+fn yaw_deg(kind: Kind) -> f32 {
+    match kind {
+        Kind::Cattle => 45.0,
+        Kind::Horse => -65.0,
+        _ => 0.0,
+    }
+}
+
+fn palette(kind: Kind) -> Palette {
+    let rgb = |r: u8, g: u8, b: u8| Vec3::new(f32::from(r), f32::from(g), f32::from(b)) / 255.0;
+    let of = |light, cavity, patina, patina_share| Palette { light, cavity, patina, patina_share };
+    match kind {
+        Kind::Dragon => of(rgb(118, 152, 122), rgb(38, 58, 48), rgb(158, 150, 96), 0.45),
+        Kind::Bunny => of(rgb(196, 176, 150), rgb(96, 76, 58), rgb(150, 140, 116), 0.4),
+        Kind::Statue => of(rgb(222, 218, 208), rgb(120, 110, 98), rgb(186, 178, 160), 0.4),
+        Kind::Cattle => of(rgb(112, 78, 52), rgb(40, 26, 18), rgb(84, 110, 92), 0.35),
+        Kind::Horse => of(rgb(132, 104, 66), rgb(46, 34, 24), rgb(92, 134, 112), 0.5),
+        Kind::Easter => of(rgb(142, 136, 126), rgb(70, 66, 60), rgb(164, 160, 112), 0.5),
+        Kind::Camel => of(rgb(190, 156, 108), rgb(94, 70, 44), rgb(160, 140, 104), 0.35),
+        Kind::Venus => of(rgb(236, 230, 218), rgb(150, 138, 122), rgb(206, 194, 172), 0.35),
+    }
+}
