@@ -1,1 +1,145 @@
-fn main() {}
+//! Edge collapse beside `meshopt::simplify`: time against measured surface distance, one thread, one run.
+//!
+//! `FARFIELD_MODELS=../models cargo bench -p farfield-core --bench collapse [-- name]` prints one table. Times are the least of three
+//! runs and include everything from positions and indices to the new indices (meshopt's: its search for equal
+//! positions too, which farfield's importers have done before). Distances are over 100,000 points of both surfaces, relative to the
+//! diagonal of the mesh's box. `speed` is meshopt's time divided by the method's at equal root mean square distance: the
+//! method's time is interpolated along its own curve (log-log) at meshopt's distance, and given where the curve reaches it.
+
+mod distance;
+mod meshes;
+
+use std::time::{Duration, Instant};
+
+use distance::{Surface, two_sided};
+use farfield_core::collapse::{LiveMesh, Mode, Placement, QuadricSettings, Quadrics, Settings, collapse};
+use glam::Vec3;
+use meshes::Mesh;
+use meshopt::{SimplifyOptions, VertexDataAdapter};
+
+/// Triangles kept, as shares of the input's.
+const SHARES: [f64; 6] = [0.5, 0.25, 0.1, 0.05, 0.02, 0.01];
+const SAMPLES: usize = 50_000;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Method {
+    Meshopt,
+    Ours(Mode, Placement),
+}
+
+const METHODS: [Method; 5] = [
+    Method::Meshopt,
+    Method::Ours(Mode::Exact, Placement::HalfEdge),
+    Method::Ours(Mode::Exact, Placement::Optimal),
+    Method::Ours(Mode::Batched, Placement::HalfEdge),
+    Method::Ours(Mode::Batched, Placement::Optimal),
+];
+
+struct Point {
+    millis: f64,
+    triangles: usize,
+    rms: f64,
+    max: f64,
+}
+
+fn main() {
+    let only = std::env::args().skip(1).find(|a| !a.starts_with('-'));
+    let mut inputs: Vec<(&str, Mesh)> =
+        vec![("sphere-200k", meshes::sphere(158)), ("sphere-1M", meshes::sphere(354))];
+    match std::env::var_os("FARFIELD_MODELS") {
+        Some(folder) => {
+            for (name, file) in [
+                ("bunny", "statuary/bun_zipper.ply.gz"),
+                ("dragon-200k", "statuary/dragon_vrip_res2.ply.gz"),
+                ("dragon", "scans/dragon_vrip.ply.gz"),
+            ] {
+                match meshes::ply(&std::path::Path::new(&folder).join(file)) {
+                    Ok(mesh) => inputs.push((name, mesh)),
+                    Err(e) => println!("skipped {name}: {e}"),
+                }
+            }
+        }
+        None => println!("skipped the scans: FARFIELD_MODELS is not set"),
+    }
+    println!(
+        "{:<12} {:<22} {:>9} {:>9} {:>9} {:>10} {:>10} {:>7}",
+        "mesh", "method", "wanted", "triangles", "ms", "rms 1e-6", "max 1e-6", "speed"
+    );
+    for (name, mesh) in inputs.iter().filter(|(name, _)| only.as_ref().is_none_or(|o| name.contains(o.as_str()))) {
+        table(name, mesh);
+    }
+}
+
+fn table(name: &str, mesh: &Mesh) {
+    let diagonal = {
+        let low = mesh.0.iter().fold(Vec3::INFINITY, |a, &b| a.min(b));
+        let high = mesh.0.iter().fold(Vec3::NEG_INFINITY, |a, &b| a.max(b));
+        low.distance(high) as f64
+    };
+    let original = Surface::new(&mesh.0, &mesh.1);
+    let mut theirs = Vec::new();
+    for method in METHODS {
+        let curve: Vec<Point> = SHARES
+            .iter()
+            .map(|share| {
+                let wanted = (mesh.1.len() as f64 / 3.0 * share) as usize;
+                let (time, (positions, indices)) = (0..3).map(|_| run(method, mesh, wanted)).min_by_key(|r| r.0).unwrap();
+                let (rms, max) = two_sided(&original, &Surface::new(&positions, &indices), SAMPLES);
+                Point {
+                    millis: time.as_secs_f64() * 1e3,
+                    triangles: indices.len() / 3,
+                    rms: rms / diagonal,
+                    max: max / diagonal,
+                }
+            })
+            .collect();
+        let label = match method {
+            Method::Meshopt => "meshopt".to_owned(),
+            Method::Ours(mode, placement) => format!("{mode:?} {placement:?}"),
+        };
+        if method == Method::Meshopt {
+            theirs = curve.iter().map(|p| (p.rms, p.millis)).collect();
+        }
+        for (i, (p, share)) in curve.iter().zip(SHARES).enumerate() {
+            let speed = at_distance(&curve, theirs[i].0).map_or("-".into(), |ms| format!("{:.2}", theirs[i].1 / ms));
+            let wanted = (mesh.1.len() as f64 / 3.0 * share) as usize;
+            println!(
+                "{name:<12} {label:<22} {wanted:>9} {:>9} {:>9.1} {:>10.2} {:>10.1} {speed:>7}",
+                p.triangles,
+                p.millis,
+                p.rms * 1e6,
+                p.max * 1e6
+            );
+        }
+    }
+}
+
+/// The time at which a method's curve has this distance, milliseconds.
+fn at_distance(curve: &[Point], rms: f64) -> Option<f64> {
+    let first = curve.iter().position(|p| p.rms >= rms)?;
+    if curve[first].rms == rms {
+        return Some(curve[first].millis);
+    }
+    let (a, b) = (&curve[first.checked_sub(1)?], &curve[first]);
+    let part = (rms / a.rms).ln() / (b.rms / a.rms).ln();
+    Some(a.millis * (b.millis / a.millis).powf(part))
+}
+
+fn run(method: Method, (positions, indices): &Mesh, wanted: usize) -> (Duration, Mesh) {
+    let start = Instant::now();
+    match method {
+        Method::Meshopt => {
+            let bytes = bytemuck::cast_slice(positions);
+            let vertices = VertexDataAdapter::new(bytes, 12, 0).unwrap();
+            let out = meshopt::simplify(indices, &vertices, wanted * 3, f32::MAX, SimplifyOptions::None, None);
+            (start.elapsed(), (positions.clone(), out))
+        }
+        Method::Ours(mode, placement) => {
+            let live = LiveMesh::new(positions, indices, &[]).unwrap();
+            let mut cost = Quadrics::new(&live, QuadricSettings { placement, ..QuadricSettings::default() });
+            let settings = Settings { mode, min_triangles: wanted, ..Settings::default() };
+            let out = collapse(live, &mut cost, &settings);
+            (start.elapsed(), (out.positions, out.indices))
+        }
+    }
+}

@@ -218,7 +218,7 @@ impl LiveMesh {
 
     fn squeeze(&mut self) {
         let mut lists = Vec::with_capacity(self.live * 6 + 64);
-        for r in self.runs.iter_mut().filter(|r| r[1] > 0) {
+        for r in &mut self.runs {
             let start = lists.len() as u32;
             lists.extend_from_slice(&self.lists[r[0] as usize..(r[0] + r[1]) as usize]);
             r[0] = start;
