@@ -3,7 +3,8 @@
 use glam::{Mat3, Vec3};
 
 use super::noise::{cells, fbm, unit};
-use super::sdf::{Knot, Solid, spline, turn, v};
+use super::sdf::Solid;
+use super::shapes::{Knot, spline, turn, v};
 
 const SIDES: [f32; 2] = [-1.0, 1.0];
 

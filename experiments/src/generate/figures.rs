@@ -5,7 +5,8 @@ use std::f32::consts::TAU;
 use glam::{Mat3, Vec3};
 
 use super::noise::{cells, fbm, unit};
-use super::sdf::{Solid, turn, v};
+use super::sdf::Solid;
+use super::shapes::{turn, v};
 
 const SIDES: [f32; 2] = [-1.0, 1.0];
 
@@ -21,30 +22,33 @@ pub(super) fn statue(spacing: f32, seed: u32) -> Solid {
     s.egg(v(0.0, 9.3, -0.2), v(4.3, 4.6, 3.6), Mat3::IDENTITY, 0.6);
     s.limb(v(-4.2, 10.5, -0.5), 1.75, v(4.2, 10.5, -0.5), 1.75, 1.8);
     s.limb(v(0.0, 10.6, -0.4), 2.6, v(0.0, 15.6, 0.1), 1.75, 1.2);
-    for i in 0..8 {
-        // Folds of the toga from the left shoulder across the breast, and over the back.
-        let t = i as f32 / 7.0;
-        let w = 0.3 + 0.22 * unit(i, 0, seed);
+    // Toga: cloth heaped on the left shoulder, folds from there across the breast and over the back.
+    s.limb(v(3.0, 11.6, -1.6), 1.3, v(3.6, 11.2, 1.2), 1.4, 0.8);
+    for i in 0..9 {
+        let t = i as f32 / 8.0;
+        let w = 0.30 + 0.16 * unit(i, 0, seed);
+        let sway = 0.3 * (unit(i, 1, seed) - 0.5);
+        let (top, low) = (1.9 + 3.2 * t, 9.6 - 4.6 * t);
         s.tube(
             &[
-                [3.3 - 0.9 * t, 12.2 - 0.2 * t, -1.2 + 0.5 * t, w],
-                [3.4 - 2.2 * t, 11.3 - 0.5 * t, 2.0 + 0.4 * t, w + 0.12],
-                [0.9 - 1.7 * t, 9.0 - 1.1 * t, 3.75 - 0.1 * t, w + 0.12],
-                [-2.4 + 0.2 * t, 7.6 - 1.7 * t, 2.9 - 0.3 * t, w],
-                [-4.6 + 1.5 * t, 7.9 - 2.4 * t, 0.4, 0.8 * w],
+                [top, 12.9 - 1.5 * t, -0.6, w],
+                [top - 0.5, 11.9 - 1.5 * t, 2.3 - 0.5 * t, w + 0.08],
+                [0.2 + 2.2 * t + sway, 10.0 - 2.6 * t, 3.9 - 0.7 * t, w + 0.14],
+                [-2.6 + 2.2 * t, low - 0.4, 3.0 - 0.9 * t, w + 0.1],
+                [-5.2 + 3.1 * t, low + 0.2 * t, 0.0, w],
             ],
-            4,
-            0.25,
+            5,
+            0.15,
         );
         s.tube(
             &[
-                [3.3 - 0.9 * t, 12.2 - 0.2 * t, -1.2, w],
-                [2.6 - 1.6 * t, 10.6 - 0.8 * t, -3.1, w + 0.1],
-                [-0.6 - 0.8 * t, 8.6 - 1.4 * t, -3.8 + 0.2 * t, w + 0.1],
-                [-4.0 + 1.4 * t, 8.0 - 2.2 * t, -1.8, 0.8 * w],
+                [top, 12.9 - 1.5 * t, -0.6, w],
+                [top - 0.6, 11.2 - 1.4 * t, -3.0 + 0.3 * t, w + 0.08],
+                [-0.4 + 1.6 * t + sway, 9.4 - 2.4 * t, -4.0 + 0.7 * t, w + 0.12],
+                [-4.4 + 2.8 * t, low + 0.2, -2.2 + 0.4 * t, w],
             ],
-            4,
-            0.25,
+            5,
+            0.15,
         );
     }
     bust_head(&mut s, seed);
@@ -57,25 +61,32 @@ fn bust_head(s: &mut Solid, seed: u32) {
     s.egg(v(0.0, 15.35, 2.35), v(0.95, 0.7, 0.75), Mat3::IDENTITY, 0.6);
     s.limb(v(0.0, 20.2, 2.0), 1.1, v(0.0, 19.3, 2.35), 0.9, 0.9);
     // Nose, lips, larynx.
-    s.limb(v(0.0, 18.9, 2.95), 0.3, v(0.0, 17.45, 3.75), 0.46, 0.35);
-    s.limb(v(0.0, 16.55, 3.05), 0.34, v(0.0, 16.55, 3.1), 0.34, 0.3);
-    s.egg(v(0.0, 16.6, 3.05), v(0.95, 0.2, 0.42), Mat3::IDENTITY, 0.12);
-    s.egg(v(0.0, 16.12, 2.98), v(0.78, 0.22, 0.42), Mat3::IDENTITY, 0.1);
-    s.carve_egg(v(0.0, 16.36, 3.5), v(0.9, 0.07, 0.35), Mat3::IDENTITY, 0.08);
+    s.limb(v(0.0, 18.9, 2.95), 0.28, v(0.0, 17.5, 3.65), 0.4, 0.35);
+    s.egg(v(0.0, 16.4, 2.75), v(1.0, 0.75, 0.6), Mat3::IDENTITY, 0.5);
+    s.egg(v(0.0, 16.58, 3.12), v(0.85, 0.2, 0.34), Mat3::IDENTITY, 0.25);
+    s.egg(v(0.0, 16.14, 3.08), v(0.7, 0.22, 0.34), Mat3::IDENTITY, 0.25);
+    s.carve_egg(v(0.0, 16.36, 3.45), v(0.85, 0.1, 0.3), Mat3::IDENTITY, 0.12);
     s.ball(v(0.0, 14.0, 1.5), 0.55, 0.6);
     for x in SIDES {
-        s.ball(v(0.42 * x, 17.4, 3.4), 0.34, 0.2);
+        s.ball(v(0.36 * x, 17.42, 3.3), 0.3, 0.25);
         s.carve_egg(v(0.28 * x, 17.15, 3.65), v(0.13, 0.14, 0.2), Mat3::IDENTITY, 0.06);
         s.carve_egg(v(1.05 * x, 18.55, 3.15), v(0.72, 0.5, 0.62), turn(0.0, 18.0 * x, 0.0), 0.35);
         s.ball(v(1.02 * x, 18.5, 2.5), 0.55, 0.04);
-        s.egg(v(1.05 * x, 18.82, 2.62), v(0.68, 0.16, 0.5), turn(0.0, 18.0 * x, -6.0 * x), 0.08);
-        s.egg(v(1.05 * x, 18.16, 2.55), v(0.6, 0.12, 0.45), turn(0.0, 18.0 * x, 0.0), 0.08);
+        s.egg(v(1.05 * x, 18.82, 2.62), v(0.7, 0.2, 0.5), turn(0.0, 18.0 * x, -6.0 * x), 0.15);
         s.limb(v(0.45 * x, 19.1, 3.0), 0.28, v(1.75 * x, 19.15, 2.3), 0.26, 0.25);
         s.egg(v(1.55 * x, 17.3, 2.0), v(0.8, 0.6, 0.8), Mat3::IDENTITY, 0.6);
-        s.egg(v(2.65 * x, 18.0, -0.25), v(0.4, 1.15, 0.75), turn(-12.0, 20.0 * x, 0.0), 0.2);
-        s.carve_egg(v(2.98 * x, 18.15, -0.15), v(0.25, 0.7, 0.38), turn(-12.0, 20.0 * x, 0.0), 0.12);
+        s.egg(v(2.5 * x, 18.0, -0.25), v(0.45, 1.1, 0.72), turn(-12.0, 20.0 * x, 0.0), 0.3);
+        s.carve_egg(v(2.98 * x, 18.1, -0.1), v(0.3, 0.6, 0.36), turn(-12.0, 20.0 * x, 0.0), 0.2);
         // Sternomastoid.
         s.limb(v(1.9 * x, 16.8, -0.4), 0.6, v(0.5 * x, 12.6, 1.7), 0.45, 0.8);
+    }
+    // Locks along the hair line, from ear to ear.
+    for i in 0..15 {
+        let a = (-105.0 + 15.0 * i as f32 + 8.0 * (unit(i, 5, seed) - 0.5)).to_radians();
+        let (sin, cos) = a.sin_cos();
+        let drop = 1.0 + 0.5 * unit(i, 6, seed) + 1.3 * sin * sin;
+        let root = v(2.6 * sin, 20.5 - 0.4 * (1.0 - cos), -0.25 + 3.0 * cos);
+        s.limb(root, 0.42, root + v(0.1 * sin + 0.3 * (unit(i, 7, seed) - 0.5), -drop, 0.12 * cos), 0.24, 0.15);
     }
     // Laurel: a ring of leaves, tilted up at the brow.
     let tilt = turn(-16.0, 0.0, 0.0);
@@ -104,7 +115,7 @@ fn statue_relief(p: Vec3, spacing: f32, seed: u32) -> f32 {
         return stone;
     }
     let combed = v(p.x, p.y, p.z) + 0.35 * fbm(p, 1.6, 2, spacing, seed ^ 3);
-    stone + hair * (0.10 + 0.26 * (cells(combed, 0.8, spacing, seed ^ 4) - 0.3))
+    stone + hair * (0.05 + 0.34 * (cells(combed, 1.0, spacing, seed ^ 4) - 0.3))
 }
 
 /// A moai: long head with brow and nose on a trunk with its arms along the sides, about 12 x 11 x 31.
@@ -120,9 +131,9 @@ pub(super) fn easter(spacing: f32, seed: u32) -> Solid {
     s.block(v(0.0, 26.9, 1.9), v(4.3, 1.35, 1.5), 0.6, turn(-14.0, 0.0, 0.0), 0.6);
     s.block(v(0.0, 30.2, -0.8), v(3.9, 0.6, 3.0), 0.5, turn(-4.0, 0.0, 0.0), 0.8);
     s.limb(v(0.0, 26.4, 2.4), 0.85, v(0.0, 21.7, 4.1), 1.15, 0.5);
-    s.egg(v(0.0, 18.95, 3.7), v(2.5, 0.5, 1.0), turn(10.0, 0.0, 0.0), 0.25);
-    s.egg(v(0.0, 17.95, 3.75), v(2.2, 0.5, 1.0), turn(-6.0, 0.0, 0.0), 0.25);
-    s.carve_limb(v(-2.3, 18.45, 4.5), 0.16, v(2.3, 18.45, 4.5), 0.16, 0.2);
+    s.egg(v(0.0, 19.1, 3.6), v(2.5, 0.65, 1.0), turn(10.0, 0.0, 0.0), 0.3);
+    s.egg(v(0.0, 17.75, 3.65), v(2.2, 0.65, 1.0), turn(-6.0, 0.0, 0.0), 0.3);
+    s.carve_egg(v(0.0, 18.42, 4.9), v(2.4, 0.35, 0.8), Mat3::IDENTITY, 0.3);
     for x in SIDES {
         s.egg(v(1.15 * x, 21.3, 3.5), v(0.8, 0.65, 0.85), Mat3::IDENTITY, 0.4);
         s.carve_egg(v(2.25 * x, 24.6, 2.9), v(1.55, 1.25, 1.15), turn(0.0, 0.0, -8.0 * x), 0.5);
@@ -135,13 +146,14 @@ pub(super) fn easter(spacing: f32, seed: u32) -> Solid {
         // Arms and hands meeting below the belly.
         s.limb(v(5.2 * x, 13.0, -0.4), 1.35, v(5.6 * x, 5.0, 0.2), 1.15, 0.5);
         s.limb(v(5.5 * x, 5.0, 0.3), 1.15, v(3.9 * x, 3.4, 4.1), 0.85, 0.4);
-        for i in 0..4 {
-            let y = 3.9 - 0.5 * i as f32;
-            s.limb(v(3.8 * x, y, 4.25), 0.34, v(1.3 * x, y - 0.2, 4.75), 0.24, 0.12);
+        s.egg(v(2.4 * x, 3.2, 4.2), v(1.9, 1.0, 0.75), turn(0.0, 14.0 * x, 8.0 * x), 0.3);
+        for i in 0..3 {
+            let y = 3.6 - 0.45 * i as f32;
+            s.carve_limb(v(3.0 * x, y, 5.1), 0.1, v(0.8 * x, y - 0.2, 5.2), 0.14, 0.1);
         }
         s.egg(v(2.1 * x, 11.6, 3.3), v(1.7, 1.3, 0.7), Mat3::IDENTITY, 0.6);
     }
-    s.ball(v(0.0, 6.0, 4.7), 0.45, 0.3);
+    s.ball(v(0.0, 6.0, 4.6), 0.6, 0.4);
     s
 }
 
@@ -160,7 +172,7 @@ pub(super) fn venus(spacing: f32, seed: u32) -> Solid {
     s.egg(v(0.3, 20.0, -1.9), v(0.85, 0.8, 0.75), Mat3::IDENTITY, 0.3);
     s.limb(v(0.55, 19.9, 1.55), 0.16, v(0.6, 19.15, 1.85), 0.22, 0.15);
     s.egg(v(0.57, 18.65, 1.55), v(0.38, 0.14, 0.2), Mat3::IDENTITY, 0.08);
-    s.ring(v(0.35, 20.5, -0.1), 1.5, 0.22, turn(-18.0, 0.0, 0.0), 0.2);
+    s.egg(v(0.35, 20.7, -0.3), v(1.5, 1.25, 1.7), turn(-14.0, 0.0, 0.0), 0.3);
     s.limb(v(0.1, 16.6, -0.25), 1.0, v(0.3, 18.8, 0.0), 0.88, 0.7);
     // Torso in contrapposto: shoulders fall to one side, hips to the other.
     s.egg(v(0.0, 14.4, -0.1), v(2.9, 3.2, 1.95), turn(0.0, 0.0, 4.0), 0.8);

@@ -17,6 +17,7 @@ mod remesh;
 mod sculpt;
 mod sdf;
 mod shade;
+mod shapes;
 
 pub use fit::{Up, fit_to_box};
 pub use kind::{Kind, PAPER_MODELS, PaperModel};
@@ -54,4 +55,13 @@ pub enum GenerateError {
         /// What is wrong with it.
         cause: &'static str,
     },
+    /// The collapse refused the mesh.
+    #[error("sculpting: {0}")]
+    Collapse(String),
+}
+
+impl From<farfield_core::Fault> for GenerateError {
+    fn from(fault: farfield_core::Fault) -> Self {
+        GenerateError::Collapse(fault.to_string())
+    }
 }

@@ -63,6 +63,9 @@ pub(super) fn fbm(p: Vec3, wavelength: f32, octaves: u32, spacing: f32, seed: u3
     sum
 }
 
+/// Own cell, then the neighbours.
+const ORDER: [f32; 3] = [0.0, -1.0, 1.0];
+
 /// Rounded cells of size `wavelength`: 1 at a cell's middle, down to 0 at its border, 0 where the mesh is too coarse for them.
 pub(super) fn cells(p: Vec3, wavelength: f32, spacing: f32, seed: u32) -> f32 {
     let keep = resolved(wavelength, spacing);
@@ -71,18 +74,20 @@ pub(super) fn cells(p: Vec3, wavelength: f32, spacing: f32, seed: u32) -> f32 {
     }
     let q = p / wavelength;
     let base = q.floor();
-    let mut nearest = 8.0_f32;
-    for k in -1..=1 {
-        for j in -1..=1 {
-            for i in -1..=1 {
-                let cell = base + Vec3::new(i as f32, j as f32, k as f32);
-                let h = hash(cell.x as i32, cell.y as i32, cell.z as i32, seed);
-                let spot = Vec3::new((h & 1023) as f32, ((h >> 10) & 1023) as f32, ((h >> 20) & 1023) as f32) / 1023.0;
-                nearest = nearest.min((cell + 0.15 + 0.7 * spot).distance_squared(q));
-            }
+    // Own cell first; a cell is only asked for its spot if that could be the nearest. Beyond 1 nothing counts.
+    let mut nearest = 1.0_f32;
+    for n in 0..27 {
+        let step = Vec3::new(ORDER[n % 3], ORDER[n / 3 % 3], ORDER[n / 9]);
+        let cell = base + step;
+        let gap = (cell + 0.15 - q).max(q - cell - 0.85).max(Vec3::ZERO);
+        if gap.length_squared() >= nearest {
+            continue;
         }
+        let h = hash(cell.x as i32, cell.y as i32, cell.z as i32, seed);
+        let spot = Vec3::new((h & 1023) as f32, ((h >> 10) & 1023) as f32, ((h >> 20) & 1023) as f32) / 1023.0;
+        nearest = nearest.min((cell + 0.15 + 0.7 * spot).distance_squared(q));
     }
-    keep * (1.0 - nearest).max(0.0)
+    keep * (1.0 - nearest)
 }
 
 /// A number in 0..1 for the `k`-th property of the `i`-th thing.

@@ -1,13 +1,16 @@
 //! From the raw surface to an even mesh of an exact triangle count that lies on the sculpture.
 //!
 //! Relaxation moves vertices towards the mean of their neighbours along the tangent plane and then back onto the surface by
-//! Newton steps p -= d(p) grad d / |grad d|^2; a move that would turn a triangle over is not made. Splitting puts a vertex in the
-//! middle of an edge, which adds exactly two triangles to a closed mesh, worst edges first (long ones, and those far from the
-//! surface), in rounds that touch no triangle twice; new vertices go onto the surface. Both keep the mesh a closed manifold.
-//! Deterministic: rounds are sorted, vertices are moved from a copy. O(vertices x rounds) evaluations of the distance.
+//! Newton steps p -= d(p) grad d / |grad d|^2; a move that would turn a triangle over is not made. The even mesh, finer than what is
+//! wanted, is then brought down to the very count by quadric edge collapse with the link condition, which puts triangles
+//! where the surface bends and keeps the mesh a closed manifold. Deterministic: vertices are moved from a copy.
+//! O(vertices x rounds) evaluations of the distance, O(n log n) for the collapse.
 
 use glam::Vec3;
 use rayon::prelude::*;
+
+use farfield_core::Fault;
+use farfield_core::collapse::{LiveMesh, Placement, QuadricSettings, Quadrics, Settings, collapse};
 
 use super::march::Raw;
 use super::sdf::Solid;
@@ -41,43 +44,31 @@ pub(super) fn project(raw: &mut Raw, solid: &Solid, steps: usize) {
     }
 }
 
-/// Splits edges until the mesh has exactly `target` triangles (an even number, at least as many as there are).
-pub(super) fn split_to(raw: &mut Raw, solid: &Solid, target: usize) {
-    while raw.triangles.len() < target {
-        let twins = twins(&raw.triangles);
-        let mut order: Vec<(f32, u32)> = (0..3 * raw.triangles.len() as u32)
-            .into_par_iter()
-            .filter(|&h| h < twins[h as usize])
-            .map(|h| {
-                let [a, b] = ends(&raw.triangles, h).map(|i| raw.positions[i as usize]);
-                // Length plus a multiple of the sagitta: curved places are refined first.
-                (a.distance(b) + 6.0 * solid.distance(0.5 * (a + b)).abs(), h)
-            })
-            .collect();
-        order.par_sort_unstable_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
-        // The worst tenth a round: what a split makes comes into the next round's order.
-        let quota = ((target - raw.triangles.len()) / 2).min((order.len() / 10).max(1));
-        let mut touched = vec![false; raw.triangles.len()];
-        let mut done = 0;
-        for &(_, h) in &order {
-            let (t, u) = (h as usize / 3, twins[h as usize] as usize / 3);
-            if done == quota {
-                break;
-            }
-            if touched[t] || touched[u] {
-                continue;
-            }
-            touched[t] = true;
-            touched[u] = true;
-            split(raw, solid, h, twins[h as usize]);
-            done += 1;
+/// Collapses edges, those that change the shape least first, down to exactly `target` triangles, an even number.
+///
+/// Each collapse takes two triangles off a closed mesh, so that an even target is met exactly unless the engine refuses all that is left;
+/// what comes back then is above the target.
+pub(super) fn reduce(raw: Raw, target: usize) -> Result<Raw, Fault> {
+    let mesh = LiveMesh::new(&raw.positions, raw.triangles.as_flattened(), &[])?;
+    let settings = QuadricSettings { placement: Placement::Optimal, shape_weight: 0.01, ..Default::default() };
+    let mut cost = Quadrics::new(&mesh, settings);
+    let out = collapse(mesh, &mut cost, &Settings { min_triangles: target, ..Default::default() });
+    let mut names = vec![u32::MAX; out.positions.len()];
+    let mut positions = Vec::with_capacity(target / 2 + 2);
+    let mut name = |c: u32| {
+        if names[c as usize] == u32::MAX {
+            names[c as usize] = positions.len() as u32;
+            positions.push(out.positions[c as usize]);
         }
-    }
+        names[c as usize]
+    };
+    let triangles = out.indices.chunks_exact(3).map(|t| [name(t[0]), name(t[1]), name(t[2])]).collect();
+    Ok(Raw { positions, triangles })
 }
 
 /// Unit normals from the distance field's gradient.
 pub(super) fn normals(raw: &Raw, solid: &Solid) -> Vec<Vec3> {
-    raw.positions.par_iter().map(|&p| normal_and_distance(solid, p).0).collect()
+    raw.positions.par_iter().map(|&p| solid.gradient(p, 0.35 * solid.detail()).0.normalize_or(Vec3::Y)).collect()
 }
 
 /// Triangles around each vertex, as the opposite edges.
@@ -161,54 +152,4 @@ fn accept(raw: &mut Raw, fans: &Fans, moved: Vec<Vec3>) {
         }
     }
     raw.positions = next;
-}
-
-fn ends(triangles: &[[u32; 3]], h: u32) -> [u32; 2] {
-    let (t, i) = (h as usize / 3, h as usize % 3);
-    [triangles[t][i], triangles[t][(i + 1) % 3]]
-}
-
-/// For each half-edge 3 t + i the one that runs the other way.
-fn twins(triangles: &[[u32; 3]]) -> Vec<u32> {
-    let mut named: Vec<(u64, u32)> = (0..3 * triangles.len() as u32)
-        .into_par_iter()
-        .map(|h| {
-            let [a, b] = ends(triangles, h);
-            (u64::from(a.min(b)) << 32 | u64::from(a.max(b)), h)
-        })
-        .collect();
-    named.par_sort_unstable();
-    let mut out = vec![u32::MAX; named.len()];
-    for pair in named.chunks_exact(2) {
-        out[pair[0].1 as usize] = pair[1].1;
-        out[pair[1].1 as usize] = pair[0].1;
-    }
-    out
-}
-
-fn split(raw: &mut Raw, solid: &Solid, h: u32, g: u32) {
-    let [a, b] = ends(&raw.triangles, h);
-    let middle = 0.5 * (raw.positions[a as usize] + raw.positions[b as usize]);
-    let m = raw.positions.len() as u32;
-    raw.positions.push(placed(raw, solid, middle, h, g));
-    for (edge, from) in [(h, a), (g, b)] {
-        let (t, i) = (edge as usize / 3, edge as usize % 3);
-        let (to, apex) = (raw.triangles[t][(i + 1) % 3], raw.triangles[t][(i + 2) % 3]);
-        raw.triangles[t] = [from, m, apex];
-        raw.triangles.push([m, to, apex]);
-    }
-}
-
-/// The middle of an edge moved onto the surface, or left where it is if that would turn one of the four triangles over.
-fn placed(raw: &Raw, solid: &Solid, middle: Vec3, h: u32, g: u32) -> Vec3 {
-    let p = onto(solid, middle, 3);
-    let fine = [h, g].into_iter().all(|edge| {
-        let (t, i) = (edge as usize / 3, edge as usize % 3);
-        let [a, b, c] = [0, 1, 2].map(|k| raw.positions[raw.triangles[t][(i + k) % 3] as usize]);
-        let before = (b - a).cross(c - a);
-        [(p - a).cross(c - a), (b - p).cross(c - p)]
-            .into_iter()
-            .all(|n| n.dot(before) > 0.3 * n.length() * before.length() && n.length() > 0.1 * before.length())
-    });
-    if fine { p } else { middle }
 }

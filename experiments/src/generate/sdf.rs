@@ -5,9 +5,13 @@
 //! where the two distances are closer than k. That makes pruning exact: a part whose bounding sphere is farther away than the
 //! distance found so far plus k cannot change the result and is skipped. Distances are exact for round cones and boxes and of
 //! first order for ellipsoids, hence true to sign everywhere and to size near the surface, which is what the mesher needs.
-//! O(parts) a point, mostly sphere tests.
+//! A grid lists the parts near each place ([`Index`]), so that a point costs
+//! O(parts near it).
 
-use glam::{Mat3, Vec3};
+use glam::{Mat3, UVec3, Vec3};
+use rayon::prelude::*;
+
+use super::shapes::{Knot, Shape, spline, v};
 
 /// The distance field of a sculpture, negative inside.
 pub(super) struct Solid {
@@ -16,9 +20,12 @@ pub(super) struct Solid {
     relief: Relief,
     /// Bound of |relief|.
     relief_max: f32,
-    /// Mesh spacing that the relief is band-limited to and that thin parts are kept thicker than.
+    /// Lattice spacing, which thin parts are kept thicker than.
     spacing: f32,
+    /// Spacing of the finished mesh, which the relief is band-limited to.
+    detail: f32,
     seed: u32,
+    index: Index,
 }
 
 /// Fine carving: place, mesh spacing, seed -> outward displacement.
@@ -33,36 +40,10 @@ struct Part {
     radius: f32,
 }
 
-enum Shape {
-    /// Convex hull of two balls.
-    RoundCone { a: Vec3, ba: Vec3, ra: f32, rb: f32 },
-    /// `turn` takes the world to the ellipsoid's axes.
-    Ellipsoid { turn: Mat3, radii: Vec3 },
-    /// A box of half extents `half` (rounding taken off) and rounding radius `round`.
-    Block { turn: Mat3, half: Vec3, round: f32 },
-    /// A ring about the turned y axis.
-    Ring { turn: Mat3, major: f32, minor: f32 },
-}
-
-/// A point of a tube: x, y, z, radius.
-pub(super) type Knot = [f32; 4];
-
-/// Shorthand for a vector.
-pub(super) const fn v(x: f32, y: f32, z: f32) -> Vec3 {
-    Vec3::new(x, y, z)
-}
-
-/// Rotation by degrees about x, then y, then z.
-pub(super) fn turn(x_deg: f32, y_deg: f32, z_deg: f32) -> Mat3 {
-    Mat3::from_rotation_z(z_deg.to_radians())
-        * Mat3::from_rotation_y(y_deg.to_radians())
-        * Mat3::from_rotation_x(x_deg.to_radians())
-}
-
 impl Solid {
     /// Nothing yet; `relief_max` bounds what `relief` returns.
     pub(super) fn new(spacing: f32, seed: u32, relief: Relief, relief_max: f32) -> Self {
-        Self { parts: Vec::new(), relief, relief_max, spacing, seed }
+        Self { parts: Vec::new(), relief, relief_max, spacing, detail: spacing, seed, index: Index::default() }
     }
 
     /// Adds a limb: the hull of a ball at `a` and one at `b`.
@@ -120,10 +101,26 @@ impl Solid {
         }
     }
 
+    /// Cuts off what is below the ground and indexes the parts: call it when all parts are there. `detail` is the spacing of the
+    /// finished mesh.
+    pub(super) fn stand(&mut self, detail: f32) {
+        self.detail = detail;
+        self.carve_block(v(0.0, -200.0, 0.0), v(400.0, 200.0, 400.0), 0.0, Mat3::IDENTITY, 0.0);
+        self.index = Index::default();
+        self.index = Index::of(self);
+    }
+
     /// Distance without relief.
     pub(super) fn smooth_distance(&self, p: Vec3) -> f32 {
+        match self.index.near(p) {
+            Some(near) => self.blended(near.iter().map(|&i| &self.parts[i as usize]), p),
+            None => self.blended(self.parts.iter(), p),
+        }
+    }
+
+    fn blended<'a>(&self, parts: impl Iterator<Item = &'a Part>, p: Vec3) -> f32 {
         let mut d = f32::MAX;
-        for part in &self.parts {
+        for part in parts {
             let lower = p.distance(part.center) - part.radius;
             let skip = if part.carve { lower > part.blend - d } else { lower > d + part.blend };
             if skip {
@@ -139,7 +136,7 @@ impl Solid {
     pub(super) fn distance(&self, p: Vec3) -> f32 {
         let d = self.smooth_distance(p);
         // Relief fades out away from the surface, so that it costs nothing there.
-        if d.abs() > 4.0 * self.relief_max { d } else { d - (self.relief)(p, self.spacing, self.seed) }
+        if d.abs() > 4.0 * self.relief_max { d } else { d - (self.relief)(p, self.detail, self.seed) }
     }
 
     /// Gradient of the distance by tetrahedral differences over `step`, and the distance itself: four evaluations.
@@ -171,14 +168,19 @@ impl Solid {
         (lo - self.relief_max, hi + self.relief_max)
     }
 
-    /// The mesh's spacing.
+    /// Spacing of the finished mesh.
+    pub(super) fn detail(&self) -> f32 {
+        self.detail
+    }
+
+    /// Spacing of the lattice.
     pub(super) fn spacing(&self) -> f32 {
         self.spacing
     }
 
     // Anything thinner than about a cell is lost or torn by the mesher: coarse meshes get thicker legs and horns instead.
     fn thinnest(&self) -> f32 {
-        0.62 * self.spacing
+        0.72 * self.spacing
     }
 
     fn cone(&mut self, a: Vec3, ra: f32, b: Vec3, rb: f32, blend: f32, carve: bool) {
@@ -190,81 +192,11 @@ impl Solid {
     }
 
     fn cuboid(&mut self, center: Vec3, half: Vec3, round: f32, axes: Mat3, blend: f32, carve: bool) {
-        let round = round.min(half.min_element());
+        // Sharp edges come out jagged: they are rounded as far as the mesh needs it.
+        let round = round.max(0.9 * self.spacing).min(half.min_element());
         let shape = Shape::Block { turn: axes.transpose(), half: half - round, round };
         self.parts.push(Part { shape, blend, carve, center, radius: half.length() });
     }
-}
-
-impl Shape {
-    fn distance(&self, p: Vec3) -> f32 {
-        match *self {
-            Shape::RoundCone { a, ba, ra, rb } => round_cone(p - a, ba, ra, rb),
-            Shape::Ellipsoid { turn, radii } => {
-                let q = turn * p;
-                let k0 = (q / radii).length();
-                let k1 = (q / (radii * radii)).length();
-                if k1 < 1e-6 { -radii.min_element() } else { k0 * (k0 - 1.0) / k1 }
-            }
-            Shape::Block { turn, half, round } => {
-                let q = (turn * p).abs() - half;
-                q.max(Vec3::ZERO).length() + q.max_element().min(0.0) - round
-            }
-            Shape::Ring { turn, major, minor } => {
-                let q = turn * p;
-                let r = (q.x * q.x + q.z * q.z).sqrt() - major;
-                (r * r + q.y * q.y).sqrt() - minor
-            }
-        }
-    }
-
-    /// Box about the part's centre.
-    fn extent(&self) -> (Vec3, Vec3) {
-        let turned = |turn: Mat3, half: Vec3| {
-            let t = turn.transpose();
-            (t.x_axis * half.x).abs() + (t.y_axis * half.y).abs() + (t.z_axis * half.z).abs()
-        };
-        match *self {
-            Shape::RoundCone { a, ba, ra, rb } => ((a - ra).min(a + ba - rb), (a + ra).max(a + ba + rb)),
-            Shape::Ellipsoid { turn, radii } => {
-                let e = turned(turn, radii);
-                (-e, e)
-            }
-            Shape::Block { turn, half, round } => {
-                let e = turned(turn, half + round);
-                (-e, e)
-            }
-            Shape::Ring { turn, major, minor } => {
-                let e = turned(turn, v(major + minor, minor, major + minor));
-                (-e, e)
-            }
-        }
-    }
-}
-
-/// Exact distance to the hull of a ball of radius `ra` at the origin and one of radius `rb` at `ba` (Quilez, "round cone").
-fn round_cone(p: Vec3, ba: Vec3, ra: f32, rb: f32) -> f32 {
-    let l2 = ba.length_squared();
-    let rr = ra - rb;
-    let a2 = l2 - rr * rr;
-    if a2 <= 0.0 {
-        // One ball holds the other.
-        return if ra >= rb { p.length() - ra } else { (p - ba).length() - rb };
-    }
-    let il2 = 1.0 / l2;
-    let y = p.dot(ba);
-    let z = y - l2;
-    let x2 = (p * l2 - ba * y).length_squared();
-    let y2 = y * y * l2;
-    let z2 = z * z * l2;
-    let k = rr.signum() * rr * rr * x2;
-    if z.signum() * a2 * z2 > k {
-        return (x2 + z2).sqrt() * il2 - rb;
-    }
-    if y.signum() * a2 * y2 < k {
-        return (x2 + y2).sqrt() * il2 - ra;
-    }
-    ((x2 * a2 * il2).sqrt() + y * rr) * il2 - ra
 }
 
 fn smooth_min(a: f32, b: f32, k: f32) -> f32 {
@@ -275,23 +207,58 @@ fn smooth_min(a: f32, b: f32, k: f32) -> f32 {
     a.min(b) - h * h * k * 0.25
 }
 
-/// Points of the Catmull-Rom spline through `knots`, `steps` a span, both ends included.
-pub(super) fn spline(knots: &[Knot], steps: usize) -> Vec<Knot> {
-    let at = |i: isize| knots[i.clamp(0, knots.len() as isize - 1) as usize];
-    let mut out = Vec::with_capacity((knots.len() - 1) * steps + 1);
-    for i in 0..knots.len() as isize - 1 {
-        let [p0, p1, p2, p3] = [at(i - 1), at(i), at(i + 1), at(i + 2)];
-        for s in 0..steps {
-            let t = s as f32 / steps as f32;
-            out.push(std::array::from_fn(|c| {
-                let (a, b, c2, d) = (p0[c], p1[c], p2[c], p3[c]);
-                0.5 * (2.0 * b
-                    + (c2 - a) * t
-                    + (2.0 * a - 5.0 * b + 4.0 * c2 - d) * t * t
-                    + (3.0 * b - a - 3.0 * c2 + d) * t * t * t)
-            }));
+/// For each cube of a coarse grid over the sculpture the parts that can shape its surface there.
+///
+/// A part is left out of a cube where it is farther from every point of it than the surface can be, plus twice the widest blend: it
+/// neither is the nearest nor blends with what is. With some hundred parts this is what makes big meshes affordable.
+#[derive(Default)]
+struct Index {
+    origin: Vec3,
+    size: f32,
+    cubes: UVec3,
+    starts: Vec<u32>,
+    parts: Vec<u16>,
+}
+
+impl Index {
+    /// Cubes along the longest side.
+    const RESOLUTION: f32 = 40.0;
+
+    fn of(solid: &Solid) -> Self {
+        let (lo, hi) = solid.bounds();
+        let size = (hi - lo).max_element() / Self::RESOLUTION;
+        let cubes = ((hi - lo) / size).ceil().as_uvec3() + 1;
+        let widest = solid.parts.iter().map(|p| p.blend).fold(0.0, f32::max);
+        let half = 0.5 * size * 3.0_f32.sqrt();
+        let lists: Vec<Vec<u16>> = (0..cubes.element_product())
+            .into_par_iter()
+            .map(|i| {
+                let cube = UVec3::new(i % cubes.x, i / cubes.x % cubes.y, i / (cubes.x * cubes.y));
+                let middle = lo + (cube.as_vec3() + 0.5) * size;
+                // Ellipsoid distances are of first order: half as much again on top of the way to the cube's corner.
+                let reach = solid.smooth_distance(middle).max(0.0) + 2.5 * half + 2.0 * widest;
+                let near = |part: &Part| {
+                    middle.distance(part.center) - part.radius < if part.carve { half + widest } else { reach }
+                };
+                (0..solid.parts.len() as u16).filter(|&k| near(&solid.parts[k as usize])).collect()
+            })
+            .collect();
+        let mut starts = vec![0];
+        for list in &lists {
+            starts.push(starts[starts.len() - 1] + list.len() as u32);
         }
+        Self { origin: lo, size, cubes, starts, parts: lists.concat() }
     }
-    out.push(knots[knots.len() - 1]);
-    out
+
+    fn near(&self, p: Vec3) -> Option<&[u16]> {
+        let cube = ((p - self.origin) / self.size).floor();
+        if cube.cmplt(Vec3::ZERO).any() || cube.cmpge(self.cubes.as_vec3()).any() {
+            return None;
+        }
+        let c = cube.as_uvec3();
+        let i = (c.x + self.cubes.x * (c.y + self.cubes.y * c.z)) as usize;
+        let list = &self.parts[self.starts[i] as usize..self.starts[i + 1] as usize];
+        // No list: far away from everything, where all parts have to be asked.
+        (!list.is_empty()).then_some(list)
+    }
 }

@@ -35,9 +35,9 @@ pub(super) fn color(
         open -= weight * (1.0 - (solid.distance(p + normal * reach) / reach).clamp(0.0, 1.0));
     }
     let open = open.clamp(0.0, 1.0);
-    let mottle = fbm(p, 0.18 * height, 5, solid.spacing(), seed ^ 0x51ed);
-    let streak = fbm(Vec3::new(p.x, 0.25 * p.y, p.z), 0.06 * height, 3, solid.spacing(), seed ^ 0x77a1);
-    let blotch = ((fbm(p, 0.3 * height, 4, solid.spacing(), seed ^ 0x0c0de) * 2.5 + 0.5).clamp(0.0, 1.0)
+    let mottle = fbm(p, 0.18 * height, 5, solid.detail(), seed ^ 0x51ed);
+    let streak = fbm(Vec3::new(p.x, 0.25 * p.y, p.z), 0.06 * height, 3, solid.detail(), seed ^ 0x77a1);
+    let blotch = ((fbm(p, 0.3 * height, 4, solid.detail(), seed ^ 0x0c0de) * 2.5 + 0.5).clamp(0.0, 1.0)
         + 0.6 * (1.0 - open))
         * palette.patina_share;
     let low = 1.0 - ((p.y - ground) / (0.12 * height)).clamp(0.0, 1.0);
