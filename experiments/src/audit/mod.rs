@@ -1,0 +1,226 @@
+//! Audits: claims held against measurements at viewpoints that nothing was built from.
+//!
+//! For each quantity there is one measurement. A *hole width* is measured on one payload alone: the object's original
+//! geometry against the payload, both seen by a camera of the view model that stands at a random viewpoint of the cell and
+//! turns the object to a random place of its picture (so the stretch towards the picture's corners is in it). A pixel is
+//! the measurement's resolution: a slit of any width may catch one row of pixel centres, so that a violation is a measured
+//! width of more than the claim plus one pixel. *Near triangles* are counted by culling, with the four side planes, every
+//! placed chunk that the cell's split calls near. Samples can refute a bound, not prove it.
+
+use std::collections::BTreeMap;
+
+use farfield_core::backend::Backend;
+use farfield_core::camera::ViewModel;
+use farfield_core::cell::Cell;
+use farfield_core::claim::{Claim, Quantity};
+use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind};
+use farfield_core::id::{AssetId, LocalPayload, ObjectId, TargetId};
+use farfield_core::scene::{ChunkSet, Scene};
+use farfield_core::{Aabb, Camera, Fault};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::measure::{hole_mask, hole_width_px};
+use crate::results::{BoundAudit, percentile};
+
+/// Targets that audits render to.
+const REFERENCE: TargetId = TargetId(u32::MAX - 1);
+const CANDIDATE: TargetId = TargetId(u32::MAX - 2);
+
+/// One built cell with what is claimed of it.
+pub struct CellAudit<'a> {
+    /// The scene; all of it and the cell's payloads are resident in the backend.
+    pub scene: &'a Scene,
+    /// The views that claims speak of.
+    pub views: &'a ViewModel,
+    /// The cell.
+    pub cell: &'a Cell,
+    /// The cell's opened asset.
+    pub asset: AssetId,
+    /// What its far field claims.
+    pub claims: &'a [Claim],
+    /// The far field's draws for a camera in the cell.
+    pub draws: &'a dyn Fn(&Camera) -> Vec<Draw>,
+}
+
+/// One measurement beside what was claimed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// Of what.
+    pub quantity: Quantity,
+    /// The bound.
+    pub claimed: f64,
+    /// The value.
+    pub measured: f64,
+}
+
+impl Measured {
+    /// Whether it refutes the claim, given the measurement's resolution.
+    pub fn violates(&self) -> bool {
+        self.measured > self.claimed + resolution(self.quantity)
+    }
+}
+
+/// What a measurement cannot tell from nothing.
+fn resolution(q: Quantity) -> f64 {
+    match q {
+        Quantity::HoleWidthPx => 1.0,
+        Quantity::NearTriangles => 0.0,
+    }
+}
+
+impl CellAudit<'_> {
+    /// Takes `n` measurements, shared out over the claims in turn. The same seed gives the same viewpoints.
+    ///
+    /// # Errors
+    /// What the backend gives.
+    pub fn sample(&self, backend: &mut dyn Backend, n: usize, seed: u64) -> Result<Vec<Measured>, Fault> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed ^ u64::from(self.cell.outline.id.0).rotate_left(32));
+        let shown = self.shown();
+        let claims: Vec<&Claim> = self.cell.claims.iter().chain(self.claims).collect();
+        let mut out = vec![];
+        for i in 0..n.min(n * claims.len()) {
+            let claim = claims[i % claims.len()];
+            let measured = match (claim.quantity, claim.payload.and_then(|p| shown.get(&p))) {
+                (Quantity::NearTriangles, _) => self.near_triangles(&mut rng),
+                (Quantity::HoleWidthPx, Some(&(object, bounds))) => {
+                    self.hole_width(backend, claim.payload, object, bounds, &mut rng)?
+                }
+                (Quantity::HoleWidthPx, None) => None,
+            };
+            out.extend(measured.map(|m| Measured { quantity: claim.quantity, claimed: claim.max, measured: m }));
+        }
+        Ok(out)
+    }
+
+    /// The payloads that are drawn from the cell's centre, with their object and box.
+    fn shown(&self) -> BTreeMap<LocalPayload, (ObjectId, Aabb)> {
+        let cube = Camera::cube(self.cell.outline.centre.as_dvec3(), 16, self.views.near);
+        let draws = cube.iter().flat_map(|c| (self.draws)(c));
+        draws
+            .filter_map(|d| match d.what {
+                DrawWhat::Payload { id, object, .. } if id.asset == self.asset && object > 0 => {
+                    Some((id.id, (ObjectId(object - 1), d.bounds)))
+                }
+                _ => None,
+            })
+            .collect()
+    }
+
+    /// A camera of the view model at a random viewpoint, with `target` at a random place of its picture; the picture cut
+    /// down to the target's box. `None` when the target lies beside the picture.
+    fn aimed(&self, target: Aabb, rng: &mut impl Rng) -> Option<Camera> {
+        let eye = self.cell.outline.region.sample(std::array::from_fn(|_| rng.random()))?.as_dvec3();
+        let to = (target.centre().as_dvec3() - eye).as_vec3();
+        let spread = |fov: f32, r: f32| (r - 0.5) * 0.9 * fov;
+        let yaw = (-to.x).atan2(-to.z) + spread(self.views.fov_x_rad(), rng.random());
+        let pitch = to.y.atan2(to.x.hypot(to.z)) + spread(self.views.fov_y_rad, rng.random());
+        let pitch = pitch.clamp(self.views.pitch_rad[0], self.views.pitch_rad[1]);
+        crop(&self.views.camera(eye, yaw, pitch), &target)
+    }
+
+    fn hole_width(
+        &self,
+        backend: &mut dyn Backend,
+        payload: Option<LocalPayload>,
+        object: ObjectId,
+        bounds: Aabb,
+        rng: &mut impl Rng,
+    ) -> Result<Option<f64>, Fault> {
+        let Some(camera) = self.aimed(bounds, rng) else { return Ok(None) };
+        let own = ChunkSet::from_range(self.scene.objects[object.index()].chunks.clone());
+        let far = own.intersection(&self.cell.splits[0].far);
+        let reference = vec![Draw { what: DrawWhat::Chunks(far), bounds, error_px: 0.0 }];
+        let candidate: Vec<Draw> = (self.draws)(&camera)
+            .into_iter()
+            .filter(|d| matches!(d.what, DrawWhat::Payload { id, .. } if Some(id.id) == payload && id.asset == self.asset))
+            .collect();
+        let pass = |writes, draws| Pass { kind: PassKind::Surface, camera, writes, draws };
+        backend.render(&DrawList { passes: vec![pass(REFERENCE, reference), pass(CANDIDATE, candidate)] })?;
+        let (r, c) = (backend.read_surface(REFERENCE)?, backend.read_surface(CANDIDATE)?);
+        Ok(Some(hole_width_px(&hole_mask(&r, &c), r.size)))
+    }
+
+    fn near_triangles(&self, rng: &mut impl Rng) -> Option<f64> {
+        let eye = self.cell.outline.region.sample(std::array::from_fn(|_| rng.random()))?.as_dvec3();
+        let pitch = self.views.pitch_rad[0] + (self.views.pitch_rad[1] - self.views.pitch_rad[0]) * rng.random::<f32>();
+        let camera = self.views.camera(eye, std::f32::consts::TAU * rng.random::<f32>(), pitch);
+        let near = self.cell.splits[0].far.complement(self.scene.chunks.len() as u32);
+        Some(self.scene.triangles_of(&self.scene.cull(&near, &camera)) as f64)
+    }
+}
+
+/// The part of a camera's picture that holds a box, with a border of two pixels, on the same pixel grid; `None` when the
+/// box lies beside the picture or reaches behind the eye.
+pub fn crop(camera: &Camera, target: &Aabb) -> Option<Camera> {
+    let (mut lo, mut hi) = (glam::Vec2::INFINITY, glam::Vec2::NEG_INFINITY);
+    for corner in target.corners() {
+        let px = camera.project((corner.as_dvec3() - camera.eye).as_vec3())?.truncate();
+        (lo, hi) = (lo.min(px), hi.max(px));
+    }
+    let size = glam::Vec2::new(camera.size[0] as f32, camera.size[1] as f32);
+    let (lo, hi) = ((lo - 2.0).floor().max(glam::Vec2::ZERO), (hi + 2.0).ceil().min(size));
+    if !lo.cmplt(hi).all() {
+        return None;
+    }
+    let (sx, sy) = ((camera.right_tan - camera.left) / size.x, (camera.top - camera.bottom) / size.y);
+    Some(Camera {
+        left: camera.left + lo.x * sx,
+        right_tan: camera.left + hi.x * sx,
+        top: camera.top - lo.y * sy,
+        bottom: camera.top - hi.y * sy,
+        size: [(hi.x - lo.x) as u32, (hi.y - lo.y) as u32],
+        ..*camera
+    })
+}
+
+/// Joins measurements into one row a quantity.
+pub fn join(claimant: &str, measured: &[Measured]) -> Vec<BoundAudit> {
+    let mut by: BTreeMap<Quantity, Vec<&Measured>> = BTreeMap::new();
+    measured.iter().for_each(|m| by.entry(m.quantity).or_default().push(m));
+    by.into_iter()
+        .map(|(quantity, all)| {
+            let mut values: Vec<f64> = all.iter().map(|m| m.measured).collect();
+            values.sort_by(f64::total_cmp);
+            BoundAudit {
+                claimant: claimant.to_owned(),
+                quantity,
+                predicted_max: all.iter().map(|m| m.claimed).fold(0.0, f64::max),
+                measured_max: values.last().copied().unwrap_or(0.0),
+                measured_p99: percentile(&values, 0.99),
+                samples: values.len(),
+                violations: all.iter().filter(|m| m.violates()).count(),
+                note: match quantity {
+                    Quantity::HoleWidthPx => "a sample violates its own claim when it exceeds it by more than one pixel".into(),
+                    Quantity::NearTriangles => String::new(),
+                },
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DVec3, Vec3};
+
+    #[test]
+    fn a_cropped_camera_keeps_the_pixel_grid() {
+        let camera = Camera::looking(DVec3::ZERO, -Vec3::Z, Vec3::Y, 1.0, [200, 100], 0.1);
+        let target = Aabb { min: Vec3::new(1.0, -0.5, -8.0), max: Vec3::new(2.0, 0.5, -7.0) };
+        let cut = crop(&camera, &target).unwrap();
+        let (whole, part) = (camera.project(target.min).unwrap(), cut.project(target.min).unwrap());
+        let shift = whole - part;
+        assert!((shift.x - shift.x.round()).abs() < 1e-2 && (shift.y - shift.y.round()).abs() < 1e-2);
+        assert!(cut.size[0] < 60 && cut.size[1] < 40);
+        assert!(crop(&camera, &Aabb { min: Vec3::splat(3.0), max: Vec3::splat(4.0) }).is_none());
+    }
+
+    #[test]
+    fn violations_are_counted_against_each_samples_own_claim() {
+        let m = |claimed, measured| Measured { quantity: Quantity::HoleWidthPx, claimed, measured };
+        let rows = join("x", &[m(1.0, 0.0), m(5.0, 5.9), m(2.0, 3.5)]);
+        assert_eq!((rows[0].violations, rows[0].samples), (1, 3));
+        assert_eq!((rows[0].predicted_max, rows[0].measured_max), (5.0, 5.9));
+    }
+}

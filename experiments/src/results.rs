@@ -1,0 +1,279 @@
+//! What a run leaves behind, as data: `summary.json` and `frames.csv`. Every number has its unit in its name.
+
+use farfield_core::backend::DeviceInfo;
+use farfield_core::claim::Quantity;
+use farfield_core::strategy::LeftOut;
+use serde::{Deserialize, Serialize};
+
+/// The version of [`Summary`]'s layout.
+pub const SCHEMA: u32 = 1;
+
+/// `summary.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// The machine: processor cores and operating system.
+    pub device: Machine,
+    /// What was rendered.
+    pub scene: SceneFacts,
+    /// The pipeline that pictures were compared with.
+    pub reference: String,
+    /// How frames equal to the reference enter a mean of PSNRs.
+    pub equal_frames_note: String,
+    /// One a pipeline, in the order of the experiment file.
+    pub pipelines: Vec<PipelineSummary>,
+}
+
+/// The machine that a run was made on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Machine {
+    /// Processor cores that the run could use.
+    pub cores: usize,
+    /// Operating system and processor architecture.
+    pub system: String,
+}
+
+/// The scene in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SceneFacts {
+    /// Where it came from.
+    pub source: String,
+    /// Triangles over all objects.
+    pub triangles: u64,
+    /// Placed meshes.
+    pub objects: usize,
+    /// Placed chunks.
+    pub chunks: usize,
+    /// Frames of the path.
+    pub frames: usize,
+    /// Width and height of a frame, pixels.
+    pub resolution_px: [u32; 2],
+}
+
+/// One pipeline's results.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PipelineSummary {
+    /// Its name in the experiment file.
+    pub name: String,
+    /// Its strategies with resolved settings.
+    pub strategies: serde_json::Value,
+    /// What drew it.
+    pub device: DeviceInfo,
+    /// What building it cost.
+    pub preprocess: Preprocess,
+    /// Time to render a frame, milliseconds; reading back not included.
+    pub frame_ms: Times,
+    /// What `frame_ms` was measured by: `gpu timestamps` or `wall clock`.
+    pub frame_ms_source: String,
+    /// Triangles a frame.
+    pub triangles: TriangleCounts,
+    /// Points a frame.
+    pub points: MeanMax,
+    /// Texels resident, bytes, at most.
+    pub texture_bytes: u64,
+    /// Payload and geometry blocks resident, bytes, at most.
+    pub resident_bytes: u64,
+    /// Frames whose eye was in no cell: plain geometry was drawn.
+    pub frames_outside_cells: usize,
+    /// Original triangles over triangles drawn in a cell, near and far together, not culled to the frustum; mean over the
+    /// frames' cells. The papers' "simplified : original" is 1 over this. 0 where nothing is simplified.
+    pub original_over_simplified: f64,
+    /// Error over the measured frames; `None` for the reference itself.
+    pub error: Option<ErrorSummary>,
+    /// Claims against measurements.
+    pub bounds: Vec<BoundAudit>,
+    /// What was left out.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// What building cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Preprocess {
+    /// Wall time of this run's build, seconds: 0 where all was in the store.
+    pub seconds: f64,
+    /// Cells built in this run.
+    pub cells_built: usize,
+    /// Cells that the path needs.
+    pub cells_needed: usize,
+    /// Cells of the partition.
+    pub cells_total: usize,
+    /// Bytes in the store for the cells needed.
+    pub bytes_stored: u64,
+    /// The process's peak resident set until the build's end, bytes.
+    pub peak_rss_bytes: u64,
+}
+
+/// A distribution of times.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Times {
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Median.
+    pub p50: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+/// Mean and largest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeanMax {
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+/// Mean and smallest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeanMin {
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Smallest.
+    pub min: f64,
+}
+
+/// Triangles a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TriangleCounts {
+    /// Original geometry.
+    pub near: MeanMax,
+    /// Payloads.
+    pub far: MeanMax,
+    /// Shadow passes.
+    pub shadow: MeanMax,
+    /// All.
+    pub total: MeanMax,
+}
+
+/// Image error over the measured frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ErrorSummary {
+    /// Frames measured.
+    pub frames: usize,
+    /// Of these, frames equal to the reference in every pixel's luminance.
+    pub equal_frames: usize,
+    /// PSNR on luminance over the whole frame, decibels.
+    pub psnr_y_db: MeanMin,
+    /// PSNR of the mean squared error pooled over all frames, decibels.
+    pub psnr_y_pooled_db: f64,
+    /// PSNR on luminance over pixels where the reference or the candidate shows an object, decibels.
+    pub psnr_y_object_db: MeanMin,
+    /// Structural similarity on luminance, 8 x 8 windows.
+    pub ssim: Option<MeanMin>,
+    /// FLIP, mean over a frame's pixels.
+    pub flip: Option<MeanMax>,
+    /// Pixels where the reference shows an object and the candidate the background, over all pixels.
+    pub hole_fraction: MeanMax,
+}
+
+/// A claim against what was measured. Measuring samples: it can refute, not prove.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BoundAudit {
+    /// Who claims.
+    pub claimant: String,
+    /// Of what.
+    pub quantity: Quantity,
+    /// The largest bound claimed.
+    pub predicted_max: f64,
+    /// The largest value measured.
+    pub measured_max: f64,
+    /// The 99th percentile of the values measured.
+    pub measured_p99: f64,
+    /// Values measured.
+    pub samples: usize,
+    /// Values above their own bound.
+    pub violations: usize,
+    /// What the measurement means and what explains its violations.
+    pub note: String,
+}
+
+/// One frame of one pipeline: a row of `frames.csv`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FrameRow {
+    /// The pipeline.
+    pub pipeline: String,
+    /// The frame's number on the path.
+    pub frame: usize,
+    /// The cell that served it; empty outside all cells.
+    pub cell: Option<u32>,
+    /// Render time, milliseconds.
+    pub frame_ms: f64,
+    /// Original triangles.
+    pub near_triangles: u64,
+    /// Payload triangles.
+    pub far_triangles: u64,
+    /// Far blocks that were not resident.
+    pub missing_blocks: u32,
+    /// Texels resident, bytes.
+    pub texture_bytes: u64,
+    /// Whole-frame PSNR, decibels; empty where the frame was not measured.
+    pub psnr_y_db: Option<f64>,
+    /// Object-pixel PSNR, decibels.
+    pub psnr_y_object_db: Option<f64>,
+    /// Structural similarity.
+    pub ssim: Option<f64>,
+    /// Mean FLIP.
+    pub flip: Option<f64>,
+    /// Hole pixels over all pixels.
+    pub hole_fraction: Option<f64>,
+}
+
+impl Times {
+    /// The distribution of `values`; zeros where there are none.
+    pub fn of(values: &[f64]) -> Self {
+        let mut v = values.to_vec();
+        v.sort_by(f64::total_cmp);
+        Self {
+            mean: mean(&v),
+            p50: percentile(&v, 0.5),
+            p95: percentile(&v, 0.95),
+            p99: percentile(&v, 0.99),
+            max: v.last().copied().unwrap_or(0.0),
+        }
+    }
+}
+
+impl MeanMax {
+    /// Mean and largest of `values`; zeros where there are none.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+        let v: Vec<f64> = values.into_iter().collect();
+        Self { mean: mean(&v), max: v.iter().copied().fold(0.0, f64::max) }
+    }
+}
+
+impl MeanMin {
+    /// Mean and smallest of `values`; zeros where there are none.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+        let v: Vec<f64> = values.into_iter().collect();
+        let min = v.iter().copied().fold(f64::INFINITY, f64::min);
+        Self { mean: mean(&v), min: if min.is_finite() { min } else { 0.0 } }
+    }
+}
+
+fn mean(v: &[f64]) -> f64 {
+    if v.is_empty() { 0.0 } else { v.iter().sum::<f64>() / v.len() as f64 }
+}
+
+/// Nearest-rank percentile of sorted values; 0 where there are none.
+pub fn percentile(sorted: &[f64], p: f64) -> f64 {
+    let rank = (p * sorted.len() as f64).ceil() as usize;
+    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distributions_are_nearest_rank() {
+        let t = Times::of(&(1..=100).map(f64::from).collect::<Vec<_>>());
+        assert_eq!((t.p50, t.p95, t.p99, t.max, t.mean), (50.0, 95.0, 99.0, 100.0, 50.5));
+        assert_eq!(Times::of(&[]), Times::default());
+        assert_eq!(MeanMin::of([3.0, 1.0, 2.0]), MeanMin { mean: 2.0, min: 1.0 });
+    }
+}
