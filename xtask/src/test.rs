@@ -1,0 +1,51 @@
+//! `cargo xtask test`: every test, with every skip counted and printed.
+//!
+//! A test that cannot run here prints `SKIPPED: name: reason`. In CI (the variable `CI` is set) a skip is a failure, but for
+//! one: tests on third-party models may be skipped where `FARFIELD_MODELS` is not set, since the models do not belong to the
+//! project.
+
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+
+pub(crate) fn run(more: &[String]) -> Result<(), String> {
+    crate::setup::driver();
+    crate::setup::validation();
+    let ci = std::env::var_os("CI").is_some();
+    let models = std::env::var_os("FARFIELD_MODELS").is_some();
+    let mut cargo = Command::new("cargo");
+    cargo.args(["test", "--workspace", "--no-fail-fast"]).args(more);
+    if !more.iter().any(|a| a == "--") {
+        cargo.arg("--");
+    }
+    cargo.arg("--show-output").stdout(Stdio::piped());
+    if ci {
+        cargo.env("FARFIELD_EXPECT_DEVICE", "1");
+        if models {
+            cargo.env("FARFIELD_EXPECT_MODELS", "1");
+        }
+    }
+    let mut child = cargo.spawn().map_err(|e| format!("cargo: {e}"))?;
+    let mut skipped: Vec<String> = vec![];
+    if let Some(out) = child.stdout.take() {
+        for line in BufReader::new(out).lines() {
+            let line = line.map_err(|e| format!("reading the tests' output: {e}"))?;
+            if let Some(at) = line.find("SKIPPED:") {
+                skipped.push(line[at + "SKIPPED:".len()..].trim().to_owned());
+            }
+            println!("{line}");
+        }
+    }
+    let status = child.wait().map_err(|e| format!("cargo: {e}"))?;
+    skipped.sort();
+    skipped.dedup();
+    println!("\n{} tests had to be skipped", skipped.len());
+    skipped.iter().for_each(|s| println!("  skipped: {s}"));
+    if !status.success() {
+        return Err(format!("tests failed ({status})"));
+    }
+    let allowed = |s: &String| !models && s.contains("FARFIELD_MODELS");
+    match skipped.iter().find(|s| !allowed(s)) {
+        Some(s) if ci => Err(format!("a skip is a failure in CI: {s}")),
+        _ => Ok(()),
+    }
+}
