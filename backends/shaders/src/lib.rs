@@ -1,1 +1,78 @@
-//! The WGSL that every GPU backend runs, and its SPIR-V by way of naga.
+//! What every GPU backend shares, so that their pictures are equal byte for byte: the WGSL, its SPIR-V by way of naga, the
+//! plain data that goes with it, and the way a draw list becomes batches of draws.
+//!
+//! A backend that is built on this keeps buffers and textures and carries out; nothing that decides a byte is left to it.
+//! The order of work:
+//!
+//! 1. [`residency::Residency::place`] packs a block and says which pages to make and what to write where;
+//! 2. [`plan::plan`] turns a draw list into passes of batches, draw records, commands and uniforms;
+//! 3. the backend uploads those three arrays, and per batch binds pipeline, pages and textures and draws its commands;
+//! 4. [`readback`] makes images of the planes that came back.
+//!
+//! Limits: a projected part draws from at most [`layout::ATLAS_SLOTS`] atlases, since binding arrays do not exist on every
+//! device.
+
+pub mod layout;
+pub mod pack;
+pub mod plan;
+pub mod pool;
+pub mod readback;
+pub mod records;
+pub mod residency;
+pub mod spirv;
+
+/// The vertex stage's entry point, in every shader.
+pub const VERTEX_ENTRY: &str = "vertex";
+
+/// The fragment stage's entry point, in every shader.
+pub const FRAGMENT_ENTRY: &str = "fragment";
+
+/// A shader: one WGSL module with a vertex and a fragment stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Shader {
+    /// The surface pass for chunks of original geometry.
+    Chunk,
+    /// The surface pass for plain payload meshes.
+    Mesh,
+    /// The surface pass for payload meshes textured by projection.
+    Projected,
+    /// The shading pass.
+    Shade,
+}
+
+impl Shader {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Chunk, Self::Mesh, Self::Projected, Self::Shade];
+
+    /// Its WGSL source, complete.
+    pub fn wgsl(self) -> &'static str {
+        match self {
+            Self::Chunk => concat!(
+                include_str!("wgsl/common.wgsl"),
+                include_str!("wgsl/surface.wgsl"),
+                include_str!("wgsl/chunk.wgsl")
+            ),
+            Self::Mesh => concat!(
+                include_str!("wgsl/common.wgsl"),
+                include_str!("wgsl/surface.wgsl"),
+                include_str!("wgsl/mesh.wgsl")
+            ),
+            Self::Projected => concat!(
+                include_str!("wgsl/common.wgsl"),
+                include_str!("wgsl/surface.wgsl"),
+                include_str!("wgsl/projected.wgsl")
+            ),
+            Self::Shade => concat!(include_str!("wgsl/common.wgsl"), include_str!("wgsl/shade.wgsl")),
+        }
+    }
+
+    /// What it is called in messages and debuggers.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Chunk => "surface of chunks",
+            Self::Mesh => "surface of payload meshes",
+            Self::Projected => "surface of projected meshes",
+            Self::Shade => "shading",
+        }
+    }
+}

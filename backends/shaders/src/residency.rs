@@ -1,0 +1,278 @@
+//! Which blocks are on the device and where: the bookkeeping of a backend, without the device.
+
+use std::collections::HashMap;
+
+use farfield_core::Fault;
+use farfield_core::backend::{BlockData, validate};
+use farfield_core::id::{AssetId, Block, LocalPayload, MeshChunkId, PayloadRef};
+use farfield_core::payload::{MeshPart, Part, Payload, ProjectedPart};
+use glam::DVec3;
+
+use crate::layout::ATLAS_SLOTS;
+use crate::pack;
+use crate::pool::{PageId, PageSizes, Pool, Span, Stream};
+
+/// Where drawable triangles lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Slot {
+    /// Their vertices.
+    pub vertices: Span,
+    /// Their indices.
+    pub indices: Span,
+}
+
+/// A resident part of a payload.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PartSlot {
+    /// A plain mesh.
+    Mesh {
+        /// Where it lies.
+        slot: Slot,
+        /// Whether it is drawn from behind too.
+        two_sided: bool,
+    },
+    /// A projected mesh.
+    Projected {
+        /// Where it lies.
+        slot: Slot,
+        /// Whether it is drawn from behind too.
+        two_sided: bool,
+        /// Where its projectors lie.
+        projectors: Span,
+        /// The payloads whose atlases it draws from, by slot.
+        atlases: [Option<LocalPayload>; ATLAS_SLOTS],
+    },
+    /// Texels; the backend keeps those of a payload's first part as textures.
+    Atlas {
+        /// Whether there are none.
+        empty: bool,
+    },
+}
+
+/// A resident payload.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PayloadSlot {
+    /// Where its positions start from, local frame.
+    pub origin: DVec3,
+    /// Its parts.
+    pub parts: Vec<PartSlot>,
+}
+
+/// What a backend has to do so that a block becomes drawable, in this order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Placement {
+    /// Pages to make, with their bytes.
+    pub pages: Vec<(PageId, u64)>,
+    /// What to write: page, byte offset, bytes (a multiple of four, as is the offset).
+    pub writes: Vec<(PageId, u64, Vec<u8>)>,
+    /// Whether the payload's first part is an atlas, whose texels have to become two textures (replacing those that the block
+    /// had; where this is false, textures that the block had are dropped).
+    pub atlas: bool,
+    /// Device bytes that the block takes, textures included.
+    pub bytes: u64,
+}
+
+/// The blocks on a device.
+#[derive(Debug)]
+pub struct Residency {
+    pools: [Pool; 5],
+    chunks: HashMap<MeshChunkId, Slot>,
+    payloads: HashMap<PayloadRef, PayloadSlot>,
+}
+
+impl Residency {
+    /// Nothing resident. `storage_max_bytes` bounds a page of projectors.
+    pub fn new(sizes: PageSizes, storage_max_bytes: u64) -> Self {
+        let bound = sizes.max_bytes.min(storage_max_bytes);
+        let projectors = PageSizes {
+            first_bytes: (1 << 20).min(bound),
+            usual_bytes: sizes.usual_bytes.min(bound),
+            max_bytes: bound,
+        };
+        Self {
+            pools: Stream::ALL.map(|s| Pool::new(s, if s == Stream::Projectors { projectors } else { sizes })),
+            chunks: HashMap::new(),
+            payloads: HashMap::new(),
+        }
+    }
+
+    /// Finds room for a block, which must be sound, and packs it. A block that is there is replaced.
+    ///
+    /// # Errors
+    /// [`Fault::Data`] where the block contradicts itself, [`Fault::Refused`] where a projected part draws from more than
+    /// [`ATLAS_SLOTS`] atlases, [`Fault::Device`] where no buffer of the device can hold a part. The block is then not there.
+    pub fn place(&mut self, block: Block, data: &BlockData<'_>) -> Result<Placement, Fault> {
+        validate(block, data)?;
+        self.release(block);
+        let mut out = Placement::default();
+        match self.find_room(block, data, &mut out) {
+            Ok(()) => Ok(out),
+            Err(fault) => {
+                self.undo(block, &out, 0);
+                Err(fault)
+            }
+        }
+    }
+
+    fn find_room(&mut self, block: Block, data: &BlockData<'_>, out: &mut Placement) -> Result<(), Fault> {
+        match (block, data) {
+            (Block::Chunk(id), BlockData::Chunk(c)) => {
+                let slot = self.triangles(
+                    block,
+                    Stream::ChunkVertices,
+                    bytemuck::cast_slice(&pack::chunk_vertices(c)),
+                    &c.indices,
+                    out,
+                )?;
+                self.chunks.insert(id, slot);
+            }
+            (Block::Payload(id), BlockData::Payload(p)) => {
+                let slot = self.payload(block, p, out)?;
+                self.payloads.insert(id, slot);
+            }
+            _ => {
+                return Err(Fault::Data {
+                    place: format!("{block:?}"),
+                    cause: "a chunk was given as a payload or a payload as a chunk".into(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn payload(&mut self, block: Block, p: &Payload, out: &mut Placement) -> Result<PayloadSlot, Fault> {
+        let mut made = PayloadSlot { origin: p.origin, parts: vec![] };
+        for (i, part) in p.parts.iter().enumerate() {
+            let slot = match part {
+                Part::Mesh(m) => self.mesh(block, m, out),
+                Part::Projected(m) => self.projected(block, m, out),
+                Part::Atlas(a) => {
+                    if i == 0 {
+                        out.atlas = !a.albedo.is_empty();
+                        out.bytes += 4 * (a.albedo.len() + a.normal.len()) as u64;
+                    }
+                    Ok(PartSlot::Atlas { empty: a.albedo.is_empty() })
+                }
+            };
+            match slot {
+                Ok(slot) => made.parts.push(slot),
+                Err(fault) => {
+                    self.give_back(&made);
+                    return Err(fault);
+                }
+            }
+        }
+        Ok(made)
+    }
+
+    fn mesh(&mut self, block: Block, m: &MeshPart, out: &mut Placement) -> Result<PartSlot, Fault> {
+        let vertices = pack::mesh_vertices(m);
+        let slot = self.triangles(block, Stream::MeshVertices, bytemuck::cast_slice(&vertices), &m.indices, out)?;
+        Ok(PartSlot::Mesh { slot, two_sided: m.two_sided })
+    }
+
+    fn projected(&mut self, block: Block, p: &ProjectedPart, out: &mut Placement) -> Result<PartSlot, Fault> {
+        let mut named: Vec<LocalPayload> = p.projectors.iter().map(|q| q.atlas).collect();
+        named.sort_unstable();
+        named.dedup();
+        if named.len() > ATLAS_SLOTS {
+            return Err(Fault::Refused(format!(
+                "{block:?}: a projected part draws from {} atlases; this backend binds {ATLAS_SLOTS}",
+                named.len()
+            )));
+        }
+        let slot_of = |i: usize| named.iter().position(|&a| a == p.projectors[i].atlas).unwrap_or(0) as u32;
+        let packed = pack::projectors(p, slot_of);
+        let projectors = self.bytes(block, Stream::Projectors, bytemuck::cast_slice(&packed), out)?;
+        let (vertices, indices) = pack::projected_vertices(p);
+        let slot = self
+            .triangles(block, Stream::ProjectedVertices, bytemuck::cast_slice(&vertices), &indices, out)
+            .inspect_err(|_| self.pools[Stream::Projectors as usize].give(projectors))?;
+        let atlases = std::array::from_fn(|i| named.get(i).copied());
+        Ok(PartSlot::Projected { slot, two_sided: p.mesh.two_sided, projectors, atlases })
+    }
+
+    fn triangles(
+        &mut self,
+        block: Block,
+        stream: Stream,
+        vertices: &[u8],
+        indices: &[u32],
+        out: &mut Placement,
+    ) -> Result<Slot, Fault> {
+        let vertices = self.bytes(block, stream, vertices, out)?;
+        let indices = self
+            .bytes(block, Stream::Indices, bytemuck::cast_slice(indices), out)
+            .inspect_err(|_| self.pools[stream as usize].give(vertices))?;
+        Ok(Slot { vertices, indices })
+    }
+
+    fn bytes(&mut self, block: Block, stream: Stream, data: &[u8], out: &mut Placement) -> Result<Span, Fault> {
+        let too_large = || Fault::Device {
+            device: "buffers".into(),
+            cause: format!("{block:?}: {} bytes of {stream:?} do not fit in one buffer of this device", data.len()),
+        };
+        let len = u32::try_from(data.len() as u64 / stream.stride()).map_err(|_| too_large())?;
+        let (span, made) = self.pools[stream as usize].take(len).ok_or_else(too_large)?;
+        let page = PageId { stream, index: span.page };
+        out.pages.extend(made.map(|bytes| (page, bytes)));
+        if len > 0 {
+            out.writes.push((page, u64::from(span.first) * stream.stride(), data.to_vec()));
+        }
+        out.bytes += data.len() as u64;
+        Ok(span)
+    }
+
+    /// Takes back what [`Residency::place`] planned, where the device refused one of its pages: the block is not there, and of
+    /// `placement.pages` only the first `made` exist.
+    pub fn undo(&mut self, block: Block, placement: &Placement, made: usize) {
+        self.release(block);
+        for (page, bytes) in placement.pages[made..].iter().rev() {
+            self.pools[page.stream as usize].forget_last_page(*bytes);
+        }
+    }
+
+    /// Frees a block; says whether it was there.
+    pub fn release(&mut self, block: Block) -> bool {
+        match block {
+            Block::Chunk(id) => {
+                self.chunks.remove(&id).map(|slot| self.give_slot(Stream::ChunkVertices, slot)).is_some()
+            }
+            Block::Payload(id) => self.payloads.remove(&id).map(|p| self.give_back(&p)).is_some(),
+        }
+    }
+
+    fn give_back(&mut self, p: &PayloadSlot) {
+        for part in &p.parts {
+            match part {
+                PartSlot::Mesh { slot, .. } => self.give_slot(Stream::MeshVertices, *slot),
+                PartSlot::Projected { slot, projectors, .. } => {
+                    self.give_slot(Stream::ProjectedVertices, *slot);
+                    self.pools[Stream::Projectors as usize].give(*projectors);
+                }
+                PartSlot::Atlas { .. } => {}
+            }
+        }
+    }
+
+    fn give_slot(&mut self, stream: Stream, slot: Slot) {
+        self.pools[stream as usize].give(slot.vertices);
+        self.pools[Stream::Indices as usize].give(slot.indices);
+    }
+
+    /// Where a chunk lies, if it is there.
+    pub fn chunk(&self, id: MeshChunkId) -> Option<Slot> {
+        self.chunks.get(&id).copied()
+    }
+
+    /// Where a payload lies, if it is there.
+    pub fn payload_slot(&self, id: PayloadRef) -> Option<&PayloadSlot> {
+        self.payloads.get(&id)
+    }
+
+    /// Whether a payload is there and its first part is an atlas with texels.
+    pub fn has_atlas(&self, asset: AssetId, id: LocalPayload) -> bool {
+        let parts = self.payloads.get(&PayloadRef { asset, id }).map(|p| &p.parts[..]);
+        matches!(parts, Some([PartSlot::Atlas { empty: false }, ..]))
+    }
+}
