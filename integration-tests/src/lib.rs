@@ -1,1 +1,3 @@
 //! Conformance, parity, golden images, the matrix.
+
+pub mod conformance;

@@ -1,0 +1,285 @@
+//! The tree under both kinds of hierarchy: four children a node, leaves that are runs of the reordered items.
+
+use std::ops::{ControlFlow, Range};
+
+use glam::{BVec4A, Vec3, Vec3A, Vec4};
+use obvhs::BvhBuildParams;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+
+use super::Ray;
+use crate::Aabb;
+
+/// Relative slack of box tests. Four roundings lie between a plane and its t, as many in a triangle's: 8 * 2^-24 < 1e-6.
+const SLACK: f32 = 1e-6;
+/// Deeper trees are rebuilt balanced, so that traversal needs no heap.
+const MAX_DEPTH: usize = 48;
+/// Three siblings wait a level.
+const STACK: usize = 3 * MAX_DEPTH + 4;
+
+/// A node: the boxes of its children, coordinate by coordinate.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct Node {
+    /// Lower (0) and upper (1) planes by axis, one lane a child. A child that is not there is inside out.
+    planes: [[Vec4; 3]; 2],
+    /// The child's node, or its first item.
+    first: [u32; 4],
+    /// The child's items; 0 where it is a node.
+    count: [u32; 4],
+}
+
+/// See the module.
+#[derive(Clone, Default)]
+pub(super) struct Tree {
+    nodes: Vec<Node>,
+    /// The items in leaf order, as the caller numbers them.
+    pub(super) order: Vec<u32>,
+    /// The box of everything in it.
+    pub(super) bounds: Option<Aabb>,
+}
+
+/// A subtree still to be visited.
+#[derive(Clone, Copy)]
+struct Waiting {
+    at: f32,
+    first: u32,
+    count: u32,
+}
+
+struct Item(obvhs::aabb::Aabb);
+
+impl obvhs::Boundable for Item {
+    fn aabb(&self) -> obvhs::aabb::Aabb {
+        self.0
+    }
+}
+
+/// A binary tree, before it is widened.
+enum Binary {
+    Leaf(Range<u32>),
+    Inner(Box<[Binary; 2]>),
+}
+
+impl Tree {
+    /// Builds over boxes with at most about `leaf` items a leaf. Boxes that are empty or not finite are left out.
+    pub(super) fn build(boxes: &[Aabb], leaf: u32) -> Self {
+        let kept: Vec<u32> = (0..boxes.len() as u32)
+            .filter(|&i| {
+                let b = &boxes[i as usize];
+                b.min.is_finite() && b.max.is_finite() && !b.is_empty()
+            })
+            .collect();
+        if kept.is_empty() {
+            return Self::default();
+        }
+        let bounds = kept.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]));
+        let centre = bounds.centre();
+        // Half a size at a time: a box from -MAX to MAX has no finite size.
+        let half = (bounds.max * 0.5 - bounds.min * 0.5).max_element();
+        let scale = if half > 0.0 { (0.5 / half).min(f32::MAX) } else { 1.0 };
+        let items: Vec<Item> = kept
+            .iter()
+            .map(|&i| {
+                let unit = |p: Vec3| Vec3A::from((p - centre) * scale).clamp(Vec3A::NEG_ONE, Vec3A::ONE);
+                Item(obvhs::aabb::Aabb::new(unit(boxes[i as usize].min), unit(boxes[i as usize].max)))
+            })
+            .collect();
+        let params = BvhBuildParams { max_prims_per_leaf: leaf, ..BvhBuildParams::medium_build() };
+        let flat = build_bvh2(&items, params, &mut std::time::Duration::default());
+
+        let mut order: Vec<u32> = flat.primitive_indices.iter().map(|&i| kept[i as usize]).collect();
+        let mut binary = unfold(&flat, 0, 0);
+        if binary.is_none() {
+            order = kept;
+            binary = Some(balanced(&mut order, 0, boxes, leaf as usize));
+        }
+        let mut tree = Self { nodes: vec![], order, bounds: Some(bounds) };
+        if let Some(b) = binary {
+            tree.widen(&b, boxes);
+        }
+        tree
+    }
+
+    fn bounds_of(&self, b: &Binary, boxes: &[Aabb]) -> Aabb {
+        match b {
+            Binary::Leaf(r) => self.order[r.start as usize..r.end as usize]
+                .iter()
+                .fold(Aabb::EMPTY, |a, &i| a.union(boxes[i as usize])),
+            Binary::Inner(c) => self.bounds_of(&c[0], boxes).union(self.bounds_of(&c[1], boxes)),
+        }
+    }
+
+    /// Writes `b` as one node over up to four of its descendants, the ones with the largest boxes opened first.
+    fn widen(&mut self, b: &Binary, boxes: &[Aabb]) -> u32 {
+        let mut open: Vec<(&Binary, Aabb)> = vec![(b, self.bounds_of(b, boxes))];
+        while open.len() < 4 {
+            let area = |a: &Aabb| {
+                let s = a.size().as_dvec3();
+                s.x * s.y + s.y * s.z + s.z * s.x
+            };
+            let widest = (0..open.len())
+                .filter(|&i| matches!(open[i].0, Binary::Inner(_)))
+                .max_by(|&i, &j| area(&open[i].1).total_cmp(&area(&open[j].1)));
+            let Some(Binary::Inner(c)) = widest.map(|i| open.remove(i).0) else { break };
+            open.extend(c.iter().map(|x| (x, self.bounds_of(x, boxes))));
+        }
+        let at = self.nodes.len();
+        let empty = [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]];
+        self.nodes.push(Node { planes: empty, first: [0; 4], count: [0; 4] });
+        for (i, (child, bounds)) in open.into_iter().enumerate() {
+            let (first, count) = match child {
+                Binary::Leaf(r) => (r.start, r.end - r.start),
+                inner => (self.widen(inner, boxes), 0),
+            };
+            let node = &mut self.nodes[at];
+            for axis in 0..3 {
+                node.planes[0][axis][i] = bounds.min[axis];
+                node.planes[1][axis][i] = bounds.max[axis];
+            }
+            (node.first[i], node.count[i]) = (first, count);
+        }
+        at as u32
+    }
+
+    /// Calls `leaf` with runs of the order that the ray may meet at some t in `ray.t_min..=t_max`, about from near to far;
+    /// `leaf` may lower `t_max` and may break off.
+    #[inline]
+    pub(super) fn cast(
+        &self,
+        ray: &Ray,
+        t_max: f32,
+        leaf: &mut impl FnMut(Range<u32>, &mut f32) -> ControlFlow<()>,
+    ) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        let mut limit = t_max;
+        let mut stack = [Waiting { at: 0.0, first: 0, count: 0 }; STACK];
+        let (mut node, mut top) = (0u32, 0usize);
+        let origin = [0, 1, 2].map(|k| Vec4::splat(ray.origin[k]));
+        let rest = [0, 1, 2].map(|k| Vec4::splat(ray.rest[k]));
+        let inverse = [0, 1, 2].map(|k| Vec4::splat(ray.inverse[k]));
+        loop {
+            let n = &self.nodes[node as usize];
+            let (mut near, mut far) = (Vec4::splat(ray.t_min), Vec4::splat(limit));
+            if ray.any_parallel {
+                for k in 0..3 {
+                    let (lo, hi) = (n.planes[0][k] - origin[k] - rest[k], n.planes[1][k] - origin[k] - rest[k]);
+                    if ray.parallel[k] {
+                        let inside = lo.cmple(Vec4::ZERO) & hi.cmpge(Vec4::ZERO);
+                        near = Vec4::select(inside, near, Vec4::INFINITY);
+                    } else {
+                        let (a, b) = if ray.negative[k] == 1 { (hi, lo) } else { (lo, hi) };
+                        (near, far) = (near.max(a * inverse[k]), far.min(b * inverse[k]));
+                    }
+                }
+            } else {
+                for k in 0..3 {
+                    let s = ray.negative[k] & 1;
+                    near = near.max((n.planes[s][k] - origin[k] - rest[k]) * inverse[k]);
+                    far = far.min((n.planes[1 - s][k] - origin[k] - rest[k]) * inverse[k]);
+                }
+            }
+            let near = near * (1.0 - SLACK);
+            let met: BVec4A = near.cmple(far * (1.0 + SLACK));
+            let mut mask = met.bitmask();
+            // The children that are met go on the stack, the nearest last.
+            let first = top;
+            while mask != 0 {
+                let i = mask.trailing_zeros() as usize & 3;
+                mask &= mask - 1;
+                let w = Waiting { at: near[i], first: n.first[i], count: n.count[i] };
+                let mut j = top;
+                while j > first && stack[j - 1].at < w.at {
+                    stack[j] = stack[j - 1];
+                    j -= 1;
+                }
+                stack[j] = w;
+                top += 1;
+            }
+            // Down to the next node, through the leaves before it.
+            loop {
+                if top == 0 {
+                    return;
+                }
+                top -= 1;
+                let w = stack[top];
+                if w.at > limit {
+                    continue;
+                }
+                if w.count == 0 {
+                    node = w.first;
+                    break;
+                }
+                if leaf(w.first..w.first + w.count, &mut limit).is_break() {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Calls `leaf` with runs of the order whose box lies within `distance2` (squared) of `p`, about from near to far; `leaf`
+    /// may lower `distance2`.
+    pub(super) fn around(&self, p: Vec3, distance2: f32, leaf: &mut impl FnMut(Range<u32>, &mut f32)) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        let mut limit = distance2;
+        let mut waiting = vec![Waiting { at: 0.0, first: 0, count: 0 }];
+        while let Some(w) = waiting.pop() {
+            if w.at > limit {
+                continue;
+            }
+            if w.count > 0 {
+                leaf(w.first..w.first + w.count, &mut limit);
+                continue;
+            }
+            let n = &self.nodes[w.first as usize];
+            let mut d2 = Vec4::ZERO;
+            for k in 0..3 {
+                let q = Vec4::splat(p[k]);
+                let out = (n.planes[0][k] - q).max(q - n.planes[1][k]).max(Vec4::ZERO);
+                d2 += out * out;
+            }
+            let d2 = d2 * (1.0 - SLACK);
+            let first = waiting.len();
+            for i in (0..4).filter(|&i| d2[i] <= limit && n.planes[0][0][i] <= n.planes[1][0][i]) {
+                waiting.push(Waiting { at: d2[i], first: n.first[i], count: n.count[i] });
+            }
+            waiting[first..].sort_by(|a, b| b.at.total_cmp(&a.at));
+        }
+    }
+
+    /// Bytes that it holds.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.order[..])
+    }
+}
+
+/// The subtree at a node; `None` where it is too deep.
+fn unfold(flat: &Bvh2, node: usize, depth: usize) -> Option<Binary> {
+    let n = flat.nodes.get(node)?;
+    if n.is_leaf() {
+        return Some(Binary::Leaf(n.first_index..n.first_index + n.prim_count));
+    }
+    if depth == MAX_DEPTH {
+        return None;
+    }
+    let child = |i: usize| unfold(flat, n.first_index as usize + i, depth + 1);
+    Some(Binary::Inner(Box::new([child(0)?, child(1)?])))
+}
+
+/// Halves the items again and again by their centres along the longest axis: at most log2(n) deep, whatever they are.
+fn balanced(order: &mut [u32], start: u32, boxes: &[Aabb], leaf: usize) -> Binary {
+    if order.len() <= leaf.max(1) {
+        return Binary::Leaf(start..start + order.len() as u32);
+    }
+    let centre = |i: u32| boxes[i as usize].centre();
+    let size = Aabb::of(order.iter().map(|&i| centre(i))).size();
+    let axis = (0..3).fold(0, |a, k| if size[k] > size[a] { k } else { a });
+    order.sort_by(|&a, &b| centre(a)[axis].total_cmp(&centre(b)[axis]).then(a.cmp(&b)));
+    let (low, high) = order.split_at_mut(order.len() / 2);
+    let middle = start + low.len() as u32;
+    Binary::Inner(Box::new([balanced(low, start, boxes, leaf), balanced(high, middle, boxes, leaf)]))
+}
