@@ -145,12 +145,7 @@ impl Tree {
     /// Calls `leaf` with runs of the order that the ray may meet at some t in `ray.t_min..=t_max`, about from near to far;
     /// `leaf` may lower `t_max` and may break off.
     #[inline]
-    pub(super) fn cast(
-        &self,
-        ray: &Ray,
-        t_max: f32,
-        leaf: &mut impl FnMut(Range<u32>, &mut f32) -> ControlFlow<()>,
-    ) {
+    pub(super) fn cast(&self, ray: &Ray, t_max: f32, leaf: &mut impl FnMut(Range<u32>, &mut f32) -> ControlFlow<()>) {
         if self.nodes.is_empty() {
             return;
         }

@@ -1,0 +1,114 @@
+//! Blocks made ready for casting: a hierarchy over the triangles, and what paints them.
+
+use farfield_core::Fault;
+use farfield_core::backend::{BlockData, validate};
+use farfield_core::bvh::TriangleBvh;
+use farfield_core::id::Block;
+use farfield_core::mesh::ChunkMesh;
+use farfield_core::payload::{AtlasPart, MeshPart, Part, Projector};
+use glam::{DVec3, Vec2, Vec3};
+
+/// Triangles with attributes.
+pub(crate) struct Surface {
+    pub(crate) bvh: TriangleBvh,
+    pub(crate) indices: Vec<u32>,
+    pub(crate) normals: Vec<Vec3>,
+    pub(crate) uvs: Vec<Vec2>,
+    /// sRGB; empty where there are none.
+    pub(crate) colors: Vec<[u8; 4]>,
+}
+
+/// A part of a payload.
+pub(crate) enum ReadyPart {
+    Mesh { surface: Surface, two_sided: bool },
+    Projected { surface: Surface, two_sided: bool, views: Vec<u32>, projectors: Vec<Projector> },
+    Atlas(AtlasPart),
+}
+
+/// A block.
+pub(crate) enum Ready {
+    Chunk(Surface),
+    Payload { origin: DVec3, parts: Vec<ReadyPart> },
+}
+
+impl Surface {
+    pub(crate) fn chunk(c: &ChunkMesh) -> Self {
+        Self {
+            bvh: TriangleBvh::build(&c.positions, &c.indices),
+            indices: c.indices.clone(),
+            normals: c.normals.clone(),
+            uvs: c.uvs.clone(),
+            colors: c.colors.clone(),
+        }
+    }
+
+    fn part(m: &MeshPart) -> Self {
+        Self {
+            bvh: TriangleBvh::build(&m.positions, &m.indices),
+            indices: m.indices.clone(),
+            normals: m.normals.clone(),
+            uvs: vec![],
+            colors: m.albedo.clone(),
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        self.bvh.bytes()
+            + size_of_val(&self.indices[..])
+            + size_of_val(&self.normals[..])
+            + size_of_val(&self.uvs[..])
+            + size_of_val(&self.colors[..])
+    }
+
+    /// The vertices of a triangle.
+    pub(crate) fn triangle(&self, i: u32) -> [usize; 3] {
+        let i = 3 * i as usize;
+        [self.indices[i] as usize, self.indices[i + 1] as usize, self.indices[i + 2] as usize]
+    }
+}
+
+impl Ready {
+    /// # Errors
+    /// [`Fault::Data`] where the block contradicts itself.
+    pub(crate) fn new(block: Block, data: &BlockData<'_>) -> Result<Self, Fault> {
+        validate(block, data)?;
+        Ok(match data {
+            BlockData::Chunk(c) => Self::Chunk(Surface::chunk(c)),
+            BlockData::Payload(p) => Self::Payload {
+                origin: p.origin,
+                parts: p
+                    .parts
+                    .iter()
+                    .map(|part| match part {
+                        Part::Mesh(m) => ReadyPart::Mesh { surface: Surface::part(m), two_sided: m.two_sided },
+                        Part::Projected(q) => ReadyPart::Projected {
+                            surface: Surface::part(&q.mesh),
+                            two_sided: q.mesh.two_sided,
+                            views: q.views.clone(),
+                            projectors: q.projectors.clone(),
+                        },
+                        Part::Atlas(a) => ReadyPart::Atlas(a.clone()),
+                    })
+                    .collect(),
+            },
+        })
+    }
+
+    /// Bytes that it takes.
+    pub(crate) fn bytes(&self) -> u64 {
+        let bytes = match self {
+            Self::Chunk(s) => s.bytes(),
+            Self::Payload { parts, .. } => parts
+                .iter()
+                .map(|p| match p {
+                    ReadyPart::Mesh { surface, .. } => surface.bytes(),
+                    ReadyPart::Projected { surface, views, projectors, .. } => {
+                        surface.bytes() + size_of_val(&views[..]) + size_of_val(&projectors[..])
+                    }
+                    ReadyPart::Atlas(a) => size_of_val(&a.albedo[..]) + size_of_val(&a.normal[..]),
+                })
+                .sum(),
+        };
+        bytes as u64
+    }
+}
