@@ -294,13 +294,16 @@ pub struct MeshView<'a> {
 pub trait SimplificationMetric: Send + Sync + Debug {
     /// A worker for one mesh, and the cost above which nothing is collapsed. `px` gives the projected length of a segment
     /// as the far field's viewpoints see it, pixels; `max_px` is the far field's tolerance.
+    ///
+    /// # Errors
+    /// [`Fault::Refused`] where settings contradict each other, [`Fault::Data`] where the mesh contradicts itself.
     fn begin<'a>(
         &self,
         mesh: MeshView<'a>,
         seen: &'a [VertexSeen],
         px: &'a (dyn Fn(Vec3, Vec3) -> f32 + Sync),
         max_px: f32,
-    ) -> (Box<dyn Cost + 'a>, f32);
+    ) -> Result<(Box<dyn Cost + 'a>, f32), Fault>;
 }
 
 /// What a visibility metric judges: an object as a cell sees it.

@@ -1,1 +1,10 @@
-//! Visibility and simplification metrics.
+//! Metrics: whether one viewpoint's samples serve a whole cell (visibility), and what collapsing an edge costs
+//! (simplification).
+
+mod quadric;
+mod self_occlusion;
+mod silhouette_weighted;
+
+pub use quadric::Quadric;
+pub use self_occlusion::SelfOcclusion;
+pub use silhouette_weighted::{Normals, SilhouetteWeighted};

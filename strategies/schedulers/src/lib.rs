@@ -1,1 +1,5 @@
-//! What is loaded, in which order, and what goes.
+//! What is resident, and when it is fetched.
+
+mod load_on_entry;
+
+pub use load_on_entry::LoadOnEntry;
