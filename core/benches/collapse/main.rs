@@ -44,8 +44,7 @@ struct Point {
 
 fn main() {
     let only = std::env::args().skip(1).find(|a| !a.starts_with('-'));
-    let mut inputs: Vec<(&str, Mesh)> =
-        vec![("sphere-200k", meshes::sphere(158)), ("sphere-1M", meshes::sphere(354))];
+    let mut inputs: Vec<(&str, Mesh)> = vec![("sphere-200k", meshes::sphere(158)), ("sphere-1M", meshes::sphere(354))];
     match std::env::var_os("FARFIELD_MODELS") {
         Some(folder) => {
             for (name, file) in [
@@ -83,7 +82,8 @@ fn table(name: &str, mesh: &Mesh) {
             .iter()
             .map(|share| {
                 let wanted = (mesh.1.len() as f64 / 3.0 * share) as usize;
-                let (time, (positions, indices)) = (0..3).map(|_| run(method, mesh, wanted)).min_by_key(|r| r.0).unwrap();
+                let (time, (positions, indices)) =
+                    (0..3).map(|_| run(method, mesh, wanted)).min_by_key(|r| r.0).unwrap();
                 let (rms, max) = two_sided(&original, &Surface::new(&positions, &indices), SAMPLES);
                 Point {
                     millis: time.as_secs_f64() * 1e3,

@@ -1,13 +1,17 @@
 //! Batched mode: passes over all edges, each of collapses that do not change each other's price.
 //!
-//! A pass prices every edge once, sorts the cheaper ones and takes them cheapest first, but none whose price an earlier one of the
-//! pass has changed: those wait for the next pass. It ends at a limit, a little above the price of the edge that would be
-//! the last one if nothing were refused, so that dear edges are not taken while cheaper ones wait. The idea of passes with
-//! an error limit is meshoptimizer's (Kapoulkine, simplifier.cpp); there are no heap and no edge structure to keep up.
+//! A pass prices every edge once and sorts the cheaper ones. Cheapest first, it chooses edges whose price no chosen one changes, up
+//! to a limit a little above the price of the edge that would be the last one if all could be had, so that dear edges are not
+//! taken while cheaper ones wait. Then it collapses the chosen in the order of their vertex ids, which is the order of
+//! memory. The idea of passes with an error limit is meshoptimizer's (Kapoulkine, simplifier.cpp); choosing first and
+//! collapsing in memory's order is not.
 //!
-//! What limits it: about 10 prices an edge in all, and the random reads of the collapses themselves.
+//! A refused edge keeps its vertices from others for the pass. When that starves a pass, the next one tries one edge after
+//! the other, cheapest first, and looks at all of them.
+//!
+//! What limits it: about 3 prices an edge of the input for a reduction to a tenth, then the collapses themselves.
 
-use super::mesh::{LiveMesh, Marks, others};
+use super::mesh::{LiveMesh, Marks};
 use super::rules::Rules;
 use super::{BLOCK, Candidate, Collapsed, Cost, Reach, Settings, resolve};
 
@@ -16,61 +20,106 @@ const SHARE: f32 = 0.3;
 /// A pass ends at this multiple of the price of its last wanted edge.
 const SLACK: f32 = 1.5;
 
-pub(super) fn run<C: Cost + ?Sized>(mut mesh: LiveMesh, cost: &mut C, settings: &Settings) -> Collapsed {
-    let vertices = mesh.positions().len();
-    let mut rules = Rules::new(&mesh, settings);
-    let mut touched = Marks::new(vertices);
-    let mut edges = Edges { marks: Marks::new(vertices), order: Vec::new(), block: Vec::new(), out: Vec::new() };
-    let (mut collapses, mut max_cost) = (0, 0f32);
-    let mut share = SHARE;
-    while mesh.live_triangles() > settings.min_triangles {
-        edges.price(&mesh, cost, settings.max_cost);
+pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Settings) -> Collapsed {
+    let mut touched = Marks::new(mesh.vertices());
+    let mut edges = Edges {
+        living: (0..mesh.all_triangles() as u32).collect(),
+        ends: Vec::new(),
+        order: Vec::new(),
+        block: Vec::new(),
+        out: Vec::new(),
+    };
+    let mut chosen: Vec<([u32; 2], f32)> = Vec::new();
+    let rules = Rules::new(&mesh, settings);
+    let mut state = Batched { mesh, cost, rules, collapses: 0, max_cost: 0.0 };
+    let mut starved = false;
+    while state.mesh.live_triangles() > settings.min_triangles {
+        edges.price(&state.mesh, state.cost, settings.max_cost);
         // A collapse takes two triangles.
-        let wanted = (mesh.live_triangles() - settings.min_triangles).div_ceil(2);
-        let limit = edges.cheapest(wanted, share);
+        let wanted = (state.mesh.live_triangles() - settings.min_triangles).div_ceil(2);
+        let limit = edges.cheapest(wanted, if starved { 1.0 } else { SHARE });
+        let before = state.collapses;
         touched.clear();
-        let before = collapses;
-        for &(price, ends) in &edges.order {
-            if mesh.live_triangles() <= settings.min_triangles || price > limit {
+        chosen.clear();
+        for &key in &edges.order {
+            let (price, ends) = edges.read(key);
+            if chosen.len() >= wanted || price > limit || state.mesh.live_triangles() <= settings.min_triangles {
                 break;
             }
             if touched.has(ends[0]) || touched.has(ends[1]) {
                 continue;
             }
-            let mut best = [Candidate::FORBIDDEN];
-            cost.costs(&mesh, &[ends], &mut best);
-            if !(best[0].cost < f32::INFINITY) || !rules.allow(&mesh, ends, best[0].place) {
-                continue;
+            // Before the collapse: it changes the rings.
+            if !starved {
+                state.touch(ends, &mut touched);
+                chosen.push((ends, price));
+            } else if state.take(ends, price) {
+                state.touch(ends, &mut touched);
             }
-            let (from, onto, at) = resolve(&mesh, ends, best[0].place);
-            if cost.reach() == Reach::Ring {
-                for v in ends {
-                    mesh.triangles_of(v).iter().flat_map(|&t| mesh.corners(t)).for_each(|x| _ = touched.insert(x));
-                }
-            }
-            touched.insert(from);
-            touched.insert(onto);
-            cost.collapsed(&mesh, from, onto, at);
-            mesh.apply(from, onto, at);
-            collapses += 1;
-            max_cost = max_cost.max(price);
         }
-        // Nothing to be had among the cheap ones: look at all, then give up.
-        if collapses > before {
-            share = SHARE;
-        } else if share < 1.0 {
-            share = 1.0;
-        } else {
+        chosen.sort_unstable_by_key(|c| c.0);
+        for &(ends, price) in &chosen {
+            if state.mesh.live_triangles() <= settings.min_triangles {
+                break;
+            }
+            state.take(ends, price);
+        }
+        let done = state.collapses - before;
+        if starved && done == 0 {
             break;
         }
+        starved = done * 8 < chosen.len() || done == 0;
     }
-    mesh.finish(collapses, max_cost)
+    state.mesh.finish(state.collapses, state.max_cost)
+}
+
+struct Batched<'a, C: ?Sized> {
+    mesh: LiveMesh,
+    cost: &'a mut C,
+    rules: Rules,
+    collapses: usize,
+    max_cost: f32,
+}
+
+impl<C: Cost + ?Sized> Batched<'_, C> {
+    /// Marks the vertices whose edges change price when this edge is collapsed, or has just been.
+    fn touch(&self, ends: [u32; 2], touched: &mut Marks) {
+        for v in ends {
+            touched.insert(v);
+            if self.cost.reach() == Reach::Ring {
+                self.mesh
+                    .triangles_of(v)
+                    .iter()
+                    .flat_map(|&t| self.mesh.corners(t))
+                    .for_each(|x| _ = touched.insert(x));
+            }
+        }
+    }
+
+    /// Collapses an edge if it may be.
+    fn take(&mut self, ends: [u32; 2], price: f32) -> bool {
+        let mut best = [Candidate::FORBIDDEN];
+        self.cost.costs(&self.mesh, &[ends], &mut best);
+        let Candidate { cost, place } = best[0];
+        if cost.is_nan() || cost == f32::INFINITY || !self.rules.allow(&self.mesh, ends, place) {
+            return false;
+        }
+        let (from, onto, at) = resolve(&self.mesh, ends, place);
+        self.cost.collapsed(&self.mesh, from, onto, at);
+        self.mesh.apply(from, onto, at);
+        self.collapses += 1;
+        self.max_cost = self.max_cost.max(price);
+        true
+    }
 }
 
 struct Edges {
-    marks: Marks,
-    /// Price and ends.
-    order: Vec<(f32, [u32; 2])>,
+    /// Triangles that were alive at the last pass.
+    living: Vec<u32>,
+    /// Edges that may be collapsed.
+    ends: Vec<[u32; 2]>,
+    /// A sortable price in the upper half, the edge's index in the lower.
+    order: Vec<u64>,
     block: Vec<[u32; 2]>,
     out: Vec<Candidate>,
 }
@@ -78,15 +127,18 @@ struct Edges {
 impl Edges {
     /// Fills `order` with every edge that may be collapsed.
     fn price<C: Cost + ?Sized>(&mut self, mesh: &LiveMesh, cost: &mut C, max_cost: f32) {
+        self.living.retain(|&t| mesh.is_alive(t));
+        self.ends.clear();
         self.order.clear();
         self.block.clear();
-        for v in 0..mesh.positions().len() as u32 {
-            self.marks.clear();
-            for &t in mesh.triangles_of(v) {
-                for x in others(mesh.corners(t), v) {
-                    if x > v && self.marks.insert(x) {
-                        self.block.push([v, x]);
-                    }
+        for i in 0..self.living.len() {
+            let [a, b, c] = mesh.corners(self.living[i]);
+            for [a, b] in [[a, b], [b, c], [c, a]] {
+                // Every edge of an orientable surface runs up its ids in one of its triangles.
+                if a < b {
+                    self.block.push([a, b]);
+                } else if mesh.is_odd(a) && mesh.is_odd(b) && !runs(mesh, b, a) {
+                    self.block.push([b, a]);
                 }
             }
             if self.block.len() >= BLOCK {
@@ -102,23 +154,44 @@ impl Edges {
         cost.costs(mesh, &self.block, &mut self.out);
         for (ends, c) in self.block.drain(..).zip(&self.out) {
             if c.cost <= max_cost && c.cost < f32::INFINITY {
-                self.order.push((c.cost, ends));
+                self.order.push((sortable(c.cost) as u64) << 32 | self.ends.len() as u64);
+                self.ends.push(ends);
             }
         }
+    }
+
+    fn read(&self, key: u64) -> (f32, [u32; 2]) {
+        (price_of(key), self.ends[key as u32 as usize])
     }
 
     /// Keeps the cheapest `share` in `order`, sorted, and returns the price at which the pass should end.
     fn cheapest(&mut self, wanted: usize, share: f32) -> f32 {
         let keep = ((self.order.len() as f32 * share) as usize).max(64).min(self.order.len());
-        let by_price = |a: &(f32, [u32; 2]), b: &(f32, [u32; 2])| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
         if keep < self.order.len() {
-            self.order.select_nth_unstable_by(keep, by_price);
+            self.order.select_nth_unstable(keep);
             self.order.truncate(keep);
         }
-        self.order.sort_unstable_by(by_price);
-        match self.order.get(wanted.min(keep).saturating_sub(1)) {
-            Some(&(price, _)) if share < 1.0 && wanted < keep => price * SLACK,
-            _ => f32::MAX,
-        }
+        self.order.sort_unstable();
+        if share < 1.0 && wanted < keep { price_of(self.order[wanted]) * SLACK } else { f32::MAX }
     }
+}
+
+/// Whether a triangle runs from a to b.
+fn runs(mesh: &LiveMesh, a: u32, b: u32) -> bool {
+    mesh.triangles_of(a).iter().any(|&t| {
+        let [x, y, z] = mesh.corners(t);
+        [[x, y], [y, z], [z, x]].contains(&[a, b])
+    })
+}
+
+/// An integer that orders as the number does.
+fn sortable(price: f32) -> u32 {
+    // + 0.0: -0 and 0 are one price.
+    let bits = (price + 0.0).to_bits();
+    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
+}
+
+fn price_of(key: u64) -> f32 {
+    let bits = (key >> 32) as u32;
+    f32::from_bits(if bits >> 31 == 1 { bits & !(1 << 31) } else { !bits })
 }

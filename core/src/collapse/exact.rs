@@ -79,7 +79,7 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
 
 impl<'a, C: Cost + ?Sized> Exact<'a, C> {
     fn new(mesh: LiveMesh, cost: &'a mut C, max_cost: f32) -> Self {
-        let vertices = mesh.positions().len();
+        let vertices = mesh.vertices();
         let mut edges_of = vec![[0; 3]; mesh.all_triangles()];
         let mut ends = Vec::with_capacity(mesh.live_triangles() * 3 / 2 + 16);
         let mut edge_to = vec![0; vertices];

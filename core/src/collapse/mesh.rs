@@ -12,19 +12,33 @@ use crate::Fault;
 /// Marks a dead triangle's first corner.
 const DEAD: u32 = u32::MAX;
 
+const LOCKED: u8 = 1;
+/// One of its edges has other than two triangles.
+const BORDER: u8 = 2;
+/// One of its edges has not as many triangles running forwards as backwards.
+const ODD: u8 = 4;
+
+/// What is known of a vertex: one fetch from memory.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+struct Vertex {
+    position: Vec3,
+    /// Its run in the list of triangles.
+    start: u32,
+    len: u32,
+    /// Whom it died into; itself while it lives.
+    remap: u32,
+    flags: u8,
+}
+
 /// A mesh under collapse, as costs see it. Ids are those of the input.
 #[derive(Clone, Debug)]
 pub struct LiveMesh {
-    positions: Vec<Vec3>,
+    vertices: Vec<Vertex>,
     triangles: Vec<[u32; 3]>,
-    /// Start and length of each vertex's run in `lists`.
-    runs: Vec<[u32; 2]>,
     lists: Vec<u32>,
     /// Squeeze `lists` at this length.
     squeeze_at: usize,
-    locked: Vec<bool>,
-    border: Vec<bool>,
-    remap: Vec<u32>,
     live: usize,
     /// A power of two that brings the mesh to about unit size: products of several lengths neither over- nor underflow.
     unit: f32,
@@ -59,74 +73,84 @@ impl LiveMesh {
             .map(|t| [t[0], t[1], t[2]])
             .map(|t| if proper(&t) { t } else { [DEAD; 3] })
             .collect();
+        let vertex = |(i, &position): (usize, &Vec3)| {
+            let flags = if locked.get(i) == Some(&true) { LOCKED } else { 0 };
+            Vertex { position, start: 0, len: 0, remap: i as u32, flags }
+        };
         let mut mesh = Self {
-            positions: positions.to_vec(),
-            runs: vec![[0; 2]; n],
+            vertices: positions.iter().enumerate().map(vertex).collect(),
+            triangles,
             lists: Vec::with_capacity(indices.len() * 2),
             squeeze_at: 0,
-            locked: if locked.is_empty() { vec![false; n] } else { locked.to_vec() },
-            border: vec![false; n],
-            remap: (0..n as u32).collect(),
             live: 0,
             unit: unit(positions),
-            triangles,
         };
         mesh.list_triangles();
         mesh.find_borders();
         Ok(mesh)
     }
 
-    /// Fills `runs` and `lists`: counting sort of corners by vertex.
+    /// Fills the vertices' runs and `lists`: counting sort of corners by vertex.
     fn list_triangles(&mut self) {
         let living = || self.triangles.iter().enumerate().filter(|(_, t)| t[0] != DEAD);
         for (_, t) in living() {
-            t.iter().for_each(|&v| self.runs[v as usize][1] += 1);
+            t.iter().for_each(|&v| self.vertices[v as usize].len += 1);
         }
         let mut end = 0;
-        for r in &mut self.runs {
-            (r[0], end) = (end, end + r[1]);
-            r[1] = 0;
+        for v in &mut self.vertices {
+            (v.start, end) = (end, end + v.len);
+            v.len = 0;
         }
         self.lists.resize(end as usize, 0);
         for (i, t) in living() {
             for &v in t {
-                let r = &mut self.runs[v as usize];
-                self.lists[(r[0] + r[1]) as usize] = i as u32;
-                r[1] += 1;
+                let v = &mut self.vertices[v as usize];
+                self.lists[(v.start + v.len) as usize] = i as u32;
+                v.len += 1;
             }
         }
         self.live = end as usize / 3;
         self.squeeze_at = (2 * self.lists.len()).max(1024);
     }
 
-    /// A vertex is at a border where one of its edges has other than two triangles.
     fn find_borders(&mut self) {
-        let mut count = vec![0u32; self.positions.len()];
-        for v in 0..self.positions.len() as u32 {
-            let others = |t: &u32| others(self.triangles[*t as usize], v);
-            let run = self.triangles_of(v);
-            run.iter().flat_map(others).for_each(|x| count[x as usize] += 1);
-            let border = run.iter().flat_map(others).any(|x| count[x as usize] != 2);
-            run.iter().flat_map(others).for_each(|x| count[x as usize] = 0);
-            self.border[v as usize] = border;
+        // Triangles that run from the vertex at hand to this one, and back.
+        let mut count = vec![[0u32; 2]; self.vertices.len()];
+        for v in 0..self.vertices.len() as u32 {
+            for &t in self.triangles_of(v) {
+                let [next, last] = others(self.corners(t), v);
+                count[next as usize][0] += 1;
+                count[last as usize][1] += 1;
+            }
+            let mut flags = 0;
+            for &t in self.triangles_of(v) {
+                for x in others(self.corners(t), v) {
+                    // Emptied at the first look; later ones see a balanced pair.
+                    let [forth, back] = std::mem::replace(&mut count[x as usize], [0, 0]);
+                    flags |=
+                        if forth != back { ODD } else { 0 } | if matches!(forth + back, 0 | 2) { 0 } else { BORDER };
+                }
+            }
+            self.vertices[v as usize].flags |= flags;
         }
     }
 
-    /// All positions by vertex id, in the input's unit.
-    pub fn positions(&self) -> &[Vec3] {
-        &self.positions
+    /// Number of vertices, dead and isolated ones included.
+    #[inline]
+    pub fn vertices(&self) -> usize {
+        self.vertices.len()
     }
 
     /// Where a vertex is.
     #[inline]
     pub fn position(&self, vertex: u32) -> Vec3 {
-        self.positions[vertex as usize]
+        self.vertices[vertex as usize].position
     }
 
     /// The living triangles of a vertex; none where it is dead or isolated.
     #[inline]
     pub fn triangles_of(&self, vertex: u32) -> &[u32] {
-        let [start, len] = self.runs[vertex as usize];
+        let Vertex { start, len, .. } = self.vertices[vertex as usize];
         &self.lists[start as usize..(start + len) as usize]
     }
 
@@ -151,13 +175,20 @@ impl LiveMesh {
     /// Whether the vertex must neither move nor die.
     #[inline]
     pub fn is_locked(&self, vertex: u32) -> bool {
-        self.locked[vertex as usize]
+        self.vertices[vertex as usize].flags & LOCKED != 0
     }
 
     /// Whether an edge of other than two triangles ended at this vertex, or at one that died into it, in the input.
     #[inline]
     pub fn is_border(&self, vertex: u32) -> bool {
-        self.border[vertex as usize]
+        self.vertices[vertex as usize].flags & BORDER != 0
+    }
+
+    /// Whether one of the vertex's edges may lack a triangle in one of its two directions. Where either end of an edge is not
+    /// odd, it has one in both: collapses keep edges balanced.
+    #[inline]
+    pub(super) fn is_odd(&self, vertex: u32) -> bool {
+        self.vertices[vertex as usize].flags & ODD != 0
     }
 
     /// 1 / (the mesh's size), rounded to a power of two; 1 where there is no finite size. Unit: 1 / the positions' unit.
@@ -177,14 +208,14 @@ impl LiveMesh {
             self.squeeze();
         }
         let start = self.lists.len();
-        let [first, len] = self.runs[onto as usize];
+        let Vertex { start: first, len, .. } = self.vertices[onto as usize];
         for i in first as usize..(first + len) as usize {
             let t = self.lists[i];
             if !self.triangles[t as usize].contains(&from) {
                 self.lists.push(t);
             }
         }
-        let [first, len] = self.runs[from as usize];
+        let Vertex { start: first, len, .. } = self.vertices[from as usize];
         for i in first as usize..(first + len) as usize {
             let t = self.lists[i];
             let corners = &mut self.triangles[t as usize];
@@ -200,15 +231,17 @@ impl LiveMesh {
                 self.lists.push(t);
             }
         }
-        self.runs[onto as usize] = [start as u32, (self.lists.len() - start) as u32];
-        self.runs[from as usize] = [0, 0];
-        self.positions[onto as usize] = at;
-        self.border[onto as usize] |= self.border[from as usize];
-        self.remap[from as usize] = onto;
+        let dying = &mut self.vertices[from as usize];
+        (dying.start, dying.len, dying.remap) = (0, 0, onto);
+        let flags = dying.flags;
+        let stays = &mut self.vertices[onto as usize];
+        (stays.start, stays.len) = (start as u32, (self.lists.len() - start) as u32);
+        stays.position = at;
+        stays.flags |= flags & (BORDER | ODD);
     }
 
     fn unlist(&mut self, vertex: u32, triangle: u32) {
-        let [start, len] = &mut self.runs[vertex as usize];
+        let Vertex { start, len, .. } = &mut self.vertices[vertex as usize];
         let run = &mut self.lists[*start as usize..(*start + *len) as usize];
         if let Some(i) = run.iter().position(|&t| t == triangle) {
             run.copy_within(i + 1.., i);
@@ -218,25 +251,26 @@ impl LiveMesh {
 
     fn squeeze(&mut self) {
         let mut lists = Vec::with_capacity(self.live * 6 + 64);
-        for r in &mut self.runs {
+        for v in &mut self.vertices {
             let start = lists.len() as u32;
-            lists.extend_from_slice(&self.lists[r[0] as usize..(r[0] + r[1]) as usize]);
-            r[0] = start;
+            lists.extend_from_slice(&self.lists[v.start as usize..(v.start + v.len) as usize]);
+            v.start = start;
         }
         self.lists = lists;
         self.squeeze_at = (2 * self.lists.len()).max(1024);
     }
 
     /// Gives the living triangles out.
-    pub(super) fn finish(mut self, collapses: usize, max_cost: f32) -> Collapsed {
+    pub(super) fn finish(self, collapses: usize, max_cost: f32) -> Collapsed {
         // Deaths are chained (a died into b, b into c): follow each chain once, halving it on the way.
-        for v in 0..self.remap.len() {
+        let mut remap: Vec<u32> = self.vertices.iter().map(|v| v.remap).collect();
+        for v in 0..remap.len() {
             let mut end = v;
-            while self.remap[end] as usize != end {
-                self.remap[end] = self.remap[self.remap[end] as usize];
-                end = self.remap[end] as usize;
+            while remap[end] as usize != end {
+                remap[end] = remap[remap[end] as usize];
+                end = remap[end] as usize;
             }
-            self.remap[v] = end as u32;
+            remap[v] = end as u32;
         }
         let mut out = Collapsed { collapses, max_cost, ..Collapsed::default() };
         out.indices.reserve_exact(self.live * 3);
@@ -245,8 +279,8 @@ impl LiveMesh {
             out.indices.extend_from_slice(t);
             out.triangles.push(i as u32);
         }
-        out.positions = self.positions;
-        out.remap = self.remap;
+        out.positions = self.vertices.iter().map(|v| v.position).collect();
+        out.remap = remap;
         out
     }
 }

@@ -12,7 +12,9 @@
 //! * The cost is sqrt(error / area), the root mean square distance to the planes in the positions' unit. It is an estimate
 //!   and no bound.
 //!
-//! 44 bytes a vertex; about 60 (half-edge) or 120 (optimal) floating-point operations a price.
+//! * With half edges it is the distance to the dying vertex's planes alone: what the other one has paid stays paid.
+//!
+//! 64 bytes a vertex; about 60 (half-edge) or 120 (optimal) floating-point operations a price, and two cache lines.
 
 use glam::{Mat3, Vec3};
 
@@ -78,6 +80,14 @@ impl Quadric {
         self.area += q.area;
     }
 
+    /// Adds one of the same origin whose b and c are 0.
+    #[inline]
+    fn add_first(&mut self, q: &Self) {
+        self.diagonal += q.diagonal;
+        self.mixed += q.mixed;
+        self.area += q.area;
+    }
+
     /// A x.
     #[inline]
     fn times(&self, x: Vec3) -> Vec3 {
@@ -111,9 +121,19 @@ impl Quadric {
     }
 }
 
+/// All that a price reads of a vertex: one cache line.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+struct Vertex {
+    quadric: Quadric,
+    /// Its position in mesh sizes.
+    position: Vec3,
+    locked: bool,
+}
+
 /// The quadric cost of a mesh's vertices.
 pub struct Quadrics {
-    of: Vec<Quadric>,
+    vertices: Vec<Vertex>,
     placement: Placement,
 }
 
@@ -121,11 +141,16 @@ impl Quadrics {
     /// The quadrics of a mesh as it is now. O(triangles).
     pub fn new(mesh: &LiveMesh, settings: QuadricSettings) -> Self {
         let unit = mesh.unit();
-        let mut of = vec![Quadric::default(); mesh.positions().len()];
+        let vertex = |v: u32| Vertex {
+            quadric: Quadric::default(),
+            position: mesh.position(v) * unit,
+            locked: mesh.is_locked(v),
+        };
+        let mut vertices: Vec<Vertex> = (0..mesh.vertices() as u32).map(vertex).collect();
         for t in (0..mesh.all_triangles() as u32).filter(|&t| mesh.is_alive(t)) {
             let corners = mesh.corners(t);
-            let p = corners.map(|v| mesh.position(v));
-            let twice_area = ((p[1] - p[0]) * unit).cross((p[2] - p[0]) * unit);
+            let p = corners.map(|v| vertices[v as usize].position);
+            let twice_area = (p[1] - p[0]).cross(p[2] - p[0]);
             let length = twice_area.length();
             if !(length.is_finite() && length > 0.0) {
                 continue;
@@ -134,63 +159,86 @@ impl Quadrics {
             let mut q = Quadric::plane(n, area);
             q.diagonal += area * settings.shape_weight;
             q.area = area;
-            corners.iter().for_each(|&v| of[v as usize].add(&q));
+            corners.iter().for_each(|&v| vertices[v as usize].quadric.add_first(&q));
             for k in 0..3 {
                 let (a, b) = (corners[k], corners[(k + 1) % 3]);
                 if settings.border_weight > 0.0 && is_border(mesh, a, b) {
-                    let edge = (p[(k + 1) % 3] - p[k]) * unit;
+                    let edge = p[(k + 1) % 3] - p[k];
                     let across = edge.cross(n).normalize_or_zero();
                     let q = Quadric::plane(across, settings.border_weight * edge.length_squared());
-                    [a, b].iter().for_each(|&v| of[v as usize].add(&q));
+                    [a, b].iter().for_each(|&v| vertices[v as usize].quadric.add_first(&q));
                 }
             }
         }
-        Self { of, placement: settings.placement }
+        Self { vertices, placement: settings.placement }
     }
 
-    /// Price of the edge.
+    /// An end of the edge and the root mean square distance, in mesh sizes, to the planes of the one that dies.
     #[inline]
-    fn price(&self, mesh: &LiveMesh, [a, b]: [u32; 2]) -> Candidate {
-        let unit = mesh.unit();
-        let (qa, qb) = (&self.of[a as usize], &self.of[b as usize]);
-        // Everything in the frame of a.
-        let d = (mesh.position(b) - mesh.position(a)) * unit;
-        let q = qb.seen_from(-d);
-        let at_first = qa.c + q.c;
-        let at_second = qa.at(d) + qb.c;
-        let locked = (mesh.is_locked(a), mesh.is_locked(b));
-        let (mut error, mut place) = match locked {
-            (true, true) => return Candidate::FORBIDDEN,
-            (true, false) => (at_first, Place::First),
-            (false, true) => (at_second, Place::Second),
-            _ if at_first <= at_second => (at_first, Place::First),
-            _ => (at_second, Place::Second),
-        };
-        if self.placement == Placement::Optimal && locked == (false, false) {
-            let mut both = q;
-            both.add(qa);
-            let middle = d / 2.0;
-            let x = both.minimum(middle).unwrap_or(middle);
-            let least = both.at(x);
-            if least <= error {
-                (error, place) = (least, Place::At(mesh.position(a) + x / unit));
+    fn half_edge(a: &Vertex, b: &Vertex) -> (f32, Place) {
+        let d = b.position - a.position;
+        let mean = |v: &Vertex, d: Vec3| (v.quadric.at(d) / v.quadric.area.max(f32::MIN_POSITIVE)).sqrt();
+        match (a.locked, b.locked) {
+            (true, true) => (f32::INFINITY, Place::First),
+            (true, false) => (mean(b, -d), Place::First),
+            (false, true) => (mean(a, d), Place::Second),
+            (false, false) => {
+                let (first, second) = (mean(b, -d), mean(a, d));
+                // A distance that is not finite must not hide behind the other one.
+                let second_is_best = second < first || first.is_nan();
+                if second_is_best { (second, Place::Second) } else { (first, Place::First) }
             }
         }
-        Candidate { cost: (error / (qa.area + qb.area).max(f32::MIN_POSITIVE)).sqrt() / unit, place }
+    }
+
+    /// The best place, and the root mean square distance, in mesh sizes, to the planes of both ends.
+    #[inline]
+    fn optimal(a: &Vertex, b: &Vertex, unit: f32) -> (f32, Place) {
+        if a.locked || b.locked {
+            return Self::half_edge(a, b);
+        }
+        // Everything in the frame of a.
+        let d = b.position - a.position;
+        let mut both = b.quadric.seen_from(-d);
+        both.add(&a.quadric);
+        let middle = d / 2.0;
+        let mut x = middle;
+        let mut error = f32::INFINITY;
+        if let Some(minimum) = both.minimum(middle) {
+            (x, error) = (minimum, both.at(minimum));
+        } else {
+            for end in [middle, Vec3::ZERO, d] {
+                let e = both.at(end);
+                if e < error {
+                    (x, error) = (end, e);
+                }
+            }
+        }
+        let mean = (error / both.area.max(f32::MIN_POSITIVE)).sqrt();
+        (mean, Place::At((a.position + x) / unit))
     }
 }
 
 impl Cost for Quadrics {
     fn costs(&mut self, mesh: &LiveMesh, edges: &[[u32; 2]], out: &mut [Candidate]) {
-        for (edge, out) in edges.iter().zip(out) {
-            *out = self.price(mesh, *edge);
+        let unit = mesh.unit();
+        for (&[a, b], out) in edges.iter().zip(out) {
+            let (a, b) = (&self.vertices[a as usize], &self.vertices[b as usize]);
+            let (distance, place) = match self.placement {
+                Placement::HalfEdge => Self::half_edge(a, b),
+                Placement::Optimal => Self::optimal(a, b, unit),
+            };
+            *out = Candidate { cost: distance / unit, place };
         }
     }
 
     fn collapsed(&mut self, mesh: &LiveMesh, from: u32, onto: u32, at: Vec3) {
-        let mut q = self.of[from as usize].seen_from((at - mesh.position(from)) * mesh.unit());
-        q.add(&self.of[onto as usize].seen_from((at - mesh.position(onto)) * mesh.unit()));
-        self.of[onto as usize] = q;
+        let at = at * mesh.unit();
+        let from = &self.vertices[from as usize];
+        let mut q = from.quadric.seen_from(at - from.position);
+        let stays = &mut self.vertices[onto as usize];
+        q.add(&stays.quadric.seen_from(at - stays.position));
+        (stays.quadric, stays.position) = (q, at);
     }
 }
 

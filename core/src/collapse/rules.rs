@@ -22,7 +22,7 @@ impl Rules {
     pub(super) fn new(mesh: &LiveMesh, settings: &Settings) -> Self {
         let turn = settings.max_turn_rad;
         Self {
-            marks: Marks::new(mesh.positions().len()),
+            marks: Marks::new(mesh.vertices()),
             apexes: Vec::new(),
             link_condition: settings.link_condition,
             min_cos: (turn < std::f32::consts::PI).then(|| turn.max(0.0).cos()),
