@@ -60,8 +60,10 @@ pub struct Setting {
     /// Its type.
     #[serde(rename = "type")]
     pub ty: SettingType,
-    /// Its default; null: it has to be given.
+    /// Its default; null: none.
     pub default: Value,
+    /// It has to be given.
+    pub required: bool,
     /// Its unit; empty for a pure number or a name.
     pub unit: String,
     /// What it does.
@@ -112,17 +114,35 @@ pub fn settings_of<T: JsonSchema>() -> Vec<Setting> {
         .into_generator()
         .into_root_schema_for::<T>();
     let Some(fields) = schema.get("properties").and_then(Value::as_object) else { return vec![] };
-    fields.iter().map(|(name, field)| setting(name, field)).collect()
+    let required = |name: &str| {
+        schema.get("required").and_then(Value::as_array).is_some_and(|r| r.iter().any(|n| n.as_str() == Some(name)))
+    };
+    fields.iter().map(|(name, field)| setting(name, field, required(name))).collect()
 }
 
-fn setting(name: &str, field: &Value) -> Setting {
+fn setting(name: &str, field: &Value, required: bool) -> Setting {
     let text = |key: &str| field.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
     Setting {
         name: name.to_owned(),
         ty: setting_type(field).unwrap_or_else(|| panic!("setting {name} has a type that files cannot give: {field}")),
-        default: field.get("default").cloned().unwrap_or(Value::Null),
+        default: field.get("default").map_or(Value::Null, shortened),
+        required,
         unit: text("unit"),
         doc: text("description").replace('\n', " "),
+    }
+}
+
+/// A default as one would write it: 0.1 for a 32-bit 0.1, which JSON spells 0.10000000149011612.
+fn shortened(v: &Value) -> Value {
+    match v {
+        Value::Number(n) if n.is_f64() => {
+            let wide = n.as_f64().unwrap_or_default();
+            let short = (wide as f32).to_string().parse().unwrap_or(wide);
+            Value::from(if f64::from(wide as f32) == wide { short } else { wide })
+        }
+        Value::Array(a) => a.iter().map(shortened).collect(),
+        Value::Object(o) => o.iter().map(|(k, v)| (k.clone(), shortened(v))).collect(),
+        _ => v.clone(),
     }
 }
 
@@ -132,10 +152,18 @@ fn setting_type(field: &Value) -> Option<SettingType> {
         return serde_json::from_value(kind.clone()).ok().map(SettingType::Strategy);
     }
     let names = |list: &Value| -> Option<Vec<String>> {
-        list.as_array()?.iter().map(|v| v.as_str().or_else(|| v.get("const")?.as_str()).map(str::to_owned)).collect()
+        list.as_array()?
+            .iter()
+            .filter(|v| !v.is_null())
+            .map(|v| v.as_str().or_else(|| v.get("const")?.as_str()).map(str::to_owned))
+            .collect()
     };
     if let Some(choices) = field.get("enum").or_else(|| field.get("oneOf")).and_then(names) {
         return Some(SettingType::Choice(choices));
+    }
+    // Option<enum> gives anyOf [the enum, null].
+    if let Some(any) = field.get("anyOf").and_then(Value::as_array) {
+        return any.iter().find(|f| f.get("type").and_then(Value::as_str) != Some("null")).and_then(setting_type);
     }
     match field.get("type")? {
         Value::String(t) => match t.as_str() {
@@ -190,6 +218,14 @@ mod tests {
         test: Option<Value>,
         /// Perhaps.
         limit: Option<f32>,
+        /// Perhaps a reading.
+        perhaps: Option<Choice>,
+        /// A share.
+        #[serde(default = "a_tenth")]
+        share: f32,
+    }
+    fn a_tenth() -> f32 {
+        0.1
     }
 
     #[test]
@@ -203,5 +239,9 @@ mod tests {
         assert_eq!(by("reading").ty, SettingType::Choice(vec!["any-corner".into(), "all-corners".into()]));
         assert_eq!(by("test").ty, SettingType::Strategy(Kind::VisibilityMetric));
         assert!(matches!(by("limit").ty, SettingType::Number { .. }));
+        assert_eq!(by("perhaps").ty, by("reading").ty);
+        assert_eq!(by("share").default, Value::from(0.1));
+        let required: Vec<&str> = s.iter().filter(|x| x.required).map(|x| x.name.as_str()).collect();
+        assert_eq!(required, ["edge", "test"]);
     }
 }
