@@ -1,0 +1,292 @@
+//! glTF 2.0 and GLB: the default scene's nodes as placements, meshes shared, primitives as parts, base colours and textures.
+//!
+//! Transforms are composed in 64 bits. Triangles, strips and fans are read; points and lines are skipped with a warning.
+//! Of the extensions KHR_materials_pbrSpecularGlossiness (its diffuse part), KHR_materials_unlit, KHR_texture_transform
+//! (applied to the coordinates) and KHR_mesh_quantization are read; a file that requires another one is refused. Samplers
+//! are not used: textures repeat. O(n).
+
+use std::path::Path;
+
+use farfield_core::color::byte_of_linear;
+use farfield_core::scene::Material;
+use gltf::json::material::AlphaMode;
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::texture::Info;
+use gltf::json::validation::{Checked, Validate};
+use gltf::json::{Index, Node, Root};
+use glam::{DAffine3, DMat4, DQuat, DVec3, Vec2, Vec3};
+
+use super::gltf_accessor::{Document, uri_bytes};
+use super::part::{Model, Part};
+use super::texture::Textures;
+use super::{LoadError, bytes};
+
+const EXTENSIONS: [&str; 4] = [
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_unlit",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+pub(super) fn read(path: &Path, data: &[u8]) -> Result<Model, LoadError> {
+    let (json, bin) = if data.starts_with(b"glTF") { chunks(path, data)? } else { (data, None) };
+    let mut root: Root = serde_json::from_slice(json)
+        .map_err(|e| LoadError::data(path, format!("line {}, column {}", e.line(), e.column()), e.to_string()))?;
+    if let Some(e) = root.extensions_required.iter().find(|e| !EXTENSIONS.contains(&e.as_str())) {
+        let cause = format!("{} is required and not supported; supported are {}", bytes::excerpt(e, 80), EXTENSIONS.join(", "));
+        return Err(LoadError::unsupported(path, "extensionsRequired", cause));
+    }
+    root.extensions_required.clear();
+    let mut first = None;
+    root.validate(&root, gltf::json::Path::new, &mut |at, e| {
+        first.get_or_insert_with(|| (at().to_string(), e.to_string()));
+    });
+    if let Some((place, cause)) = first {
+        return Err(LoadError::data(path, place, cause));
+    }
+    if !root.asset.version.starts_with("2.") {
+        let cause = format!("glTF {} is not supported; 2.x is", bytes::excerpt(&root.asset.version, 20));
+        return Err(LoadError::unsupported(path, "asset.version", cause));
+    }
+
+    let doc = Document::new(path, &root, bin)?;
+    let mut model = Model::default();
+    let mut textures = Textures::default();
+    for i in 0..root.materials.len() {
+        let m = material(&doc, i, &mut textures, &mut model.warnings);
+        model.materials.push(m);
+    }
+    model.materials.push(Material { base_color: [1.0; 4], ..Default::default() });
+    model.textures = textures.finish();
+    for i in 0..root.meshes.len() {
+        let part = mesh(&doc, i, &mut model.warnings)?;
+        model.parts.push(part);
+    }
+    model.placements = nodes(path, &root, &mut model.warnings)?;
+    for (n, what) in [(root.animations.len(), "animations"), (root.skins.len(), "skins")] {
+        if n > 0 {
+            model.warnings.push(format!("{n} {what} not used: meshes stand as they are stored"));
+        }
+    }
+    Ok(model)
+}
+
+/// The JSON and binary chunks of a GLB (glTF 2.0, section 4.4).
+fn chunks<'a>(path: &Path, data: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>), LoadError> {
+    let word = |at: usize| data.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    let bad = |place: &str, cause: String| LoadError::data(path, place, cause);
+    match (word(4), word(8)) {
+        (Some(2), Some(n)) if n as usize <= data.len() => {}
+        (Some(2), Some(n)) => return Err(bad("GLB header", format!("announces {n} bytes; the file has {}", data.len()))),
+        (Some(v), Some(_)) => return Err(bad("GLB header", format!("version {v}, not 2"))),
+        _ => return Err(bad("GLB header", "the file ends in it".into())),
+    }
+    let (mut json, mut bin, mut at) = (None, None, 12);
+    while let (Some(n), Some(kind)) = (word(at), word(at + 4)) {
+        let chunk = data.get(at + 8..at + 8 + n as usize).ok_or_else(|| {
+            bad("GLB chunk", format!("{n} bytes at byte {} of a file of {}", at + 8, data.len()))
+        })?;
+        match &kind.to_le_bytes() {
+            b"JSON" => json = json.or(Some(chunk)),
+            b"BIN\0" => bin = bin.or(Some(chunk)),
+            _ => {}
+        }
+        at += 8 + n as usize;
+    }
+    json.map(|j| (j, bin)).ok_or_else(|| bad("GLB", "has no JSON chunk".into()))
+}
+
+/// Every node with a mesh below the default scene (or the first, or, without scenes, all roots), transforms composed.
+fn nodes(path: &Path, root: &Root, warnings: &mut Vec<String>) -> Result<Vec<(usize, DAffine3)>, LoadError> {
+    let scene = root.scene.map(|s| s.value()).or((!root.scenes.is_empty()).then_some(0));
+    let tops: Vec<usize> = match scene {
+        Some(s) => root.scenes[s].nodes.iter().map(Index::value).collect(),
+        None => {
+            let mut top = vec![true; root.nodes.len()];
+            root.nodes.iter().flat_map(|n| n.children.iter().flatten()).for_each(|c| top[c.value()] = false);
+            (0..top.len()).filter(|&i| top[i]).collect()
+        }
+    };
+    let mut seen = vec![false; root.nodes.len()];
+    let mut out = vec![];
+    let mut flat = 0;
+    let mut stack: Vec<(usize, DAffine3)> = tops.into_iter().rev().map(|i| (i, DAffine3::IDENTITY)).collect();
+    while let Some((i, above)) = stack.pop() {
+        if std::mem::replace(&mut seen[i], true) {
+            return Err(LoadError::data(path, format!("nodes[{i}]"), "is reached twice: nodes do not form a tree"));
+        }
+        let n = &root.nodes[i];
+        let own = transform(n);
+        let here = above * own;
+        if !here.is_finite() {
+            return Err(LoadError::data(path, format!("nodes[{i}]"), "its transform is not finite"));
+        }
+        if let Some(m) = n.mesh {
+            if here.matrix3.determinant() == 0.0 {
+                flat += 1;
+            } else {
+                out.push((m.value(), here));
+            }
+        }
+        stack.extend(n.children.iter().flatten().rev().map(|c| (c.value(), here)));
+    }
+    if flat > 0 {
+        warnings.push(format!("{flat} nodes whose transform flattens their mesh left out"));
+    }
+    Ok(out)
+}
+
+fn transform(n: &Node) -> DAffine3 {
+    if let Some(m) = n.matrix {
+        return DAffine3::from_mat4(DMat4::from_cols_array(&m.map(f64::from)));
+    }
+    let three = |v: Option<[f32; 3]>, d: f64| v.map_or(DVec3::splat(d), |v| DVec3::from(v.map(f64::from)));
+    let [x, y, z, w] = n.rotation.map_or([0.0, 0.0, 0.0, 1.0], |q| q.0.map(f64::from));
+    // Stored with 32 bits, quaternions are a little off unit length.
+    let turn = DQuat::from_xyzw(x, y, z, w);
+    let turn = if turn.length_squared() > 0.0 { turn.normalize() } else { DQuat::IDENTITY };
+    DAffine3::from_scale_rotation_translation(three(n.scale, 1.0), turn, three(n.translation, 0.0))
+}
+
+/// The texture that gives a material its colour, and the factor on it.
+fn base(m: &gltf::json::Material) -> ([f32; 4], Option<&Info>) {
+    match m.extensions.as_ref().and_then(|e| e.pbr_specular_glossiness.as_ref()) {
+        Some(s) => (s.diffuse_factor.0, s.diffuse_texture.as_ref()),
+        None => (m.pbr_metallic_roughness.base_color_factor.0, m.pbr_metallic_roughness.base_color_texture.as_ref()),
+    }
+}
+
+fn material(doc: &Document, i: usize, textures: &mut Textures, warnings: &mut Vec<String>) -> Material {
+    let m = &doc.root.materials[i];
+    let name = m.name.clone().unwrap_or_else(|| format!("material {i}"));
+    let (factor, info) = base(m);
+    if m.alpha_mode != Checked::Valid(AlphaMode::Opaque) {
+        warnings.push(format!("material \"{name}\" is transparent: it is drawn opaque"));
+    }
+    let texture = info.and_then(|info| {
+        let image = &doc.root.images[doc.root.textures[info.index.value()].source.value()];
+        let at = format!("images[{}]", doc.root.textures[info.index.value()].source.value());
+        let made = match (&image.uri, image.buffer_view) {
+            (Some(uri), _) if !uri.starts_with("data:") => {
+                textures.file(doc.path.parent().unwrap_or(Path::new("")), &super::gltf_accessor::unescaped(uri))
+            }
+            (Some(uri), _) => uri_bytes(doc.path, uri).and_then(|d| textures.memory(&at, &d)),
+            (None, Some(view)) => doc.view(view).map_err(|e| e.to_string()).and_then(|d| textures.memory(&at, d)),
+            (None, None) => Err("has neither uri nor bufferView".into()),
+        };
+        made.map_err(|cause| warnings.push(format!("{at}: {cause}: the plain colour is taken"))).ok()
+    });
+    let base_color = factor.map(|v| if v.is_finite() { v.clamp(0.0, 1.0) } else { 1.0 });
+    Material { name, base_color, texture, two_sided: m.double_sided }
+}
+
+/// All triangles of a mesh.
+fn mesh(doc: &Document, i: usize, warnings: &mut Vec<String>) -> Result<Part, LoadError> {
+    let m = &doc.root.meshes[i];
+    let name = m.name.clone().unwrap_or_else(|| format!("mesh {i}"));
+    let mut part = Part { name, place: "triangle", ..Default::default() };
+    for (k, p) in m.primitives.iter().enumerate() {
+        primitive(doc, p, &format!("meshes[{i}].primitives[{k}]"), &mut part, warnings)?;
+    }
+    Ok(part)
+}
+
+fn primitive(
+    doc: &Document,
+    p: &Primitive,
+    place: &str,
+    part: &mut Part,
+    warnings: &mut Vec<String>,
+) -> Result<(), LoadError> {
+    let bad = |cause: String| LoadError::data(doc.path, place, cause);
+    let find = |s: Semantic| p.attributes.get(&Checked::Valid(s)).copied();
+    let Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) = p.mode else {
+        warnings.push(format!("{place} holds points or lines: left out"));
+        return Ok(());
+    };
+    let Some(positions) = find(Semantic::Positions) else {
+        return Err(bad("has no POSITION".into()));
+    };
+    let positions = doc.numbers::<3>(positions, 0.0)?;
+    let n = positions.len();
+    let indices = match p.indices {
+        Some(id) => doc.indices(id)?,
+        None => (0..n as u32).collect(),
+    };
+    if let Some(at) = indices.iter().position(|&v| v as usize >= n) {
+        return Err(bad(format!("index {at} names vertex {} of {n}", indices[at])));
+    }
+    if mode == Mode::Triangles && indices.len() % 3 != 0 {
+        return Err(bad(format!("{} indices are not whole triangles", indices.len())));
+    }
+    let material = p.material.map_or(doc.root.materials.len(), |m| m.value());
+    let info = p.material.and_then(|m| base(&doc.root.materials[m.value()]).1);
+    let normals = find(Semantic::Normals).map(|a| doc.numbers::<3>(a, 0.0)).transpose()?;
+    let set = info.map_or(0, |i| {
+        let moved = i.extensions.as_ref().and_then(|e| e.texture_transform.as_ref()).and_then(|t| t.tex_coord);
+        moved.unwrap_or(i.tex_coord)
+    });
+    let uvs = find(Semantic::TexCoords(set)).map(|a| doc.numbers::<2>(a, 0.0)).transpose()?;
+    let colors = find(Semantic::Colors(0)).map(|a| doc.numbers::<4>(a, 1.0)).transpose()?;
+    for (what, len) in [
+        ("NORMAL", normals.as_ref().map(Vec::len)),
+        ("TEXCOORD", uvs.as_ref().map(Vec::len)),
+        ("COLOR", colors.as_ref().map(Vec::len)),
+    ] {
+        if let Some(len) = len.filter(|&l| l != n) {
+            return Err(bad(format!("{what} has {len} items for {n} vertices")));
+        }
+    }
+
+    let first = part.positions.len() as u32;
+    if u64::from(first) + n as u64 > u64::from(u32::MAX) {
+        return Err(bad("the mesh has more than 2^32 vertices".into()));
+    }
+    part.positions.extend(positions.iter().map(|p| DVec3::from(p.map(f64::from))));
+    let all = part.positions.len();
+    // Attributes that only some primitives have: the others get none, (0, 0) and white.
+    if normals.is_some() || !part.normals.is_empty() {
+        part.normals.resize(first as usize, Vec3::ZERO);
+        part.normals.extend(normals.into_iter().flatten().map(Vec3::from));
+        part.normals.resize(all, Vec3::ZERO);
+    }
+    if uvs.is_some() || !part.uvs.is_empty() {
+        let placed = placement(info);
+        part.uvs.resize(first as usize, Vec2::ZERO);
+        part.uvs.extend(uvs.into_iter().flatten().map(|uv| placed(Vec2::from(uv))));
+        part.uvs.resize(all, Vec2::ZERO);
+    }
+    if colors.is_some() || !part.colors.is_empty() {
+        part.colors.resize(first as usize, [255; 4]);
+        part.colors.extend(colors.into_iter().flatten().map(|[r, g, b, _]| {
+            let [r, g, b] = [r, g, b].map(|v| if v.is_finite() { byte_of_linear(v) } else { 255 });
+            [r, g, b, 255]
+        }));
+        part.colors.resize(all, [255; 4]);
+    }
+    let mut push = |t: [u32; 3]| {
+        part.triangles.push(t.map(|v| first + v));
+        part.materials.push(material as u32);
+    };
+    match mode {
+        Mode::TriangleStrip => indices.windows(3).enumerate().for_each(|(k, w)| {
+            push(if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] });
+        }),
+        // Section 3.7.2.1: (v[i+1], v[i+2], v[0]).
+        Mode::TriangleFan => indices.windows(2).skip(1).for_each(|w| push([w[0], w[1], indices[0]])),
+        _ => indices.chunks_exact(3).for_each(|t| push([t[0], t[1], t[2]])),
+    }
+    Ok(())
+}
+
+/// KHR_texture_transform: uv' = offset + R(rotation) (scale uv).
+fn placement(info: Option<&Info>) -> impl Fn(Vec2) -> Vec2 {
+    let t = info.and_then(|i| i.extensions.as_ref()).and_then(|e| e.texture_transform.as_ref());
+    let (offset, scale, angle) =
+        t.map_or((Vec2::ZERO, Vec2::ONE, 0.0), |t| (Vec2::from(t.offset.0), Vec2::from(t.scale.0), t.rotation.0));
+    let (s, c) = angle.sin_cos();
+    move |uv| {
+        let uv = uv * scale;
+        offset + Vec2::new(c * uv.x + s * uv.y, c * uv.y - s * uv.x)
+    }
+}

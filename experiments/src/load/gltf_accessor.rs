@@ -1,0 +1,219 @@
+//! glTF buffers and accessors: every offset, stride and count is held against the bytes that are there before any is read.
+//!
+//! Follows glTF 2.0 sections 3.6 (buffers, accessors, sparse accessors) and 3.6.2.2 (integers, normalised or not: so
+//! KHR_mesh_quantization needs nothing more). O(n).
+
+use std::path::Path;
+
+use base64::Engine;
+use gltf::json::accessor::{ComponentType, IndexComponentType};
+use gltf::json::validation::Checked;
+use gltf::json::{Accessor, Index, Root, buffer};
+
+use super::{LoadError, bytes, mtl};
+
+/// The document with its buffers.
+pub(super) struct Document<'a> {
+    pub(super) path: &'a Path,
+    pub(super) root: &'a Root,
+    buffers: Vec<std::borrow::Cow<'a, [u8]>>,
+}
+
+impl<'a> Document<'a> {
+    /// Reads every buffer: the GLB's own, data URIs and files beside the document.
+    pub(super) fn new(path: &'a Path, root: &'a Root, bin: Option<&'a [u8]>) -> Result<Self, LoadError> {
+        let mut buffers = vec![];
+        for (i, b) in root.buffers.iter().enumerate() {
+            let bad = |cause: String| LoadError::data(path, format!("buffer {i}"), cause);
+            let data = match &b.uri {
+                Some(uri) => uri_bytes(path, uri).map_err(bad)?.into(),
+                None => match bin.filter(|_| i == 0) {
+                    Some(bin) => bin.into(),
+                    None => return Err(bad("has neither a uri nor a binary chunk".into())),
+                },
+            };
+            if (data.len() as u64) < b.byte_length.0 {
+                return Err(bad(format!("has {} bytes, {} were announced", data.len(), b.byte_length.0)));
+            }
+            buffers.push(data);
+        }
+        Ok(Self { path, root, buffers })
+    }
+
+    /// The bytes of a buffer view.
+    pub(super) fn view(&self, id: Index<buffer::View>) -> Result<&[u8], LoadError> {
+        let v = &self.root.buffer_views[id.value()];
+        let data = &self.buffers[v.buffer.value()];
+        let start = v.byte_offset.unwrap_or_default().0;
+        let range = start.checked_add(v.byte_length.0).map(|end| start as usize..end as usize);
+        range.and_then(|r| data.get(r)).ok_or_else(|| {
+            let cause = format!("{} bytes at {start} of a buffer of {}", v.byte_length.0, data.len());
+            LoadError::data(self.path, format!("bufferView {}", id.value()), cause)
+        })
+    }
+
+    /// `count` items of `size` bytes each, `stride` apart, from byte `offset` of a view.
+    fn items(&self, id: Index<buffer::View>, offset: u64, size: usize, count: u64) -> Result<Items<'_>, LoadError> {
+        let view = self.view(id)?;
+        let stride = self.root.buffer_views[id.value()].byte_stride.map_or(size, |s| s.0);
+        // The last item needs `size` bytes only.
+        let end = count.saturating_sub(1).checked_mul(stride as u64).and_then(|n| n.checked_add(size as u64));
+        let end = end.and_then(|n| n.checked_add(offset));
+        if stride < size || count > 0 && end.is_none_or(|n| n > view.len() as u64) {
+            let cause = format!("{count} items of {size} bytes, {stride} apart, from byte {offset} on do not fit in {} bytes", view.len());
+            return Err(LoadError::data(self.path, format!("bufferView {}", id.value()), cause));
+        }
+        Ok(Items { data: &view[offset.min(view.len() as u64) as usize..], size, stride, count: count as usize })
+    }
+
+    /// An accessor as numbers, `N` an item; fewer components than `N` leave the rest at `fill`.
+    pub(super) fn numbers<const N: usize>(&self, id: Index<Accessor>, fill: f32) -> Result<Vec<[f32; N]>, LoadError> {
+        let raw = self.raw(id)?;
+        let normalized = self.root.accessors[id.value()].normalized;
+        Ok(raw
+            .values
+            .chunks_exact(raw.components)
+            .map(|c| {
+                let mut out = [fill; N];
+                out.iter_mut().zip(c).for_each(|(o, &v)| *o = if normalized { raw.kind.normalized(v) } else { v as f32 });
+                out
+            })
+            .collect())
+    }
+
+    /// An accessor as indices.
+    pub(super) fn indices(&self, id: Index<Accessor>) -> Result<Vec<u32>, LoadError> {
+        let raw = self.raw(id)?;
+        if !matches!(raw.kind.0, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) || raw.components != 1 {
+            let cause = "indices are not unsigned scalars";
+            return Err(LoadError::data(self.path, format!("accessor {}", id.value()), cause));
+        }
+        // Exact: 64-bit floats hold every 32-bit integer.
+        Ok(raw.values.into_iter().map(|v| v as u32).collect())
+    }
+
+    fn raw(&self, id: Index<Accessor>) -> Result<Raw, LoadError> {
+        let a = &self.root.accessors[id.value()];
+        let bad = |cause: &str| LoadError::data(self.path, format!("accessor {}", id.value()), cause);
+        let (Checked::Valid(kind), Checked::Valid(shape)) = (a.component_type, a.type_) else {
+            return Err(bad("has no valid type"));
+        };
+        let (kind, components) = (Kind(kind.0), shape.multiplicity());
+        let size = kind.0.size() * components;
+        let mut values = match a.buffer_view {
+            Some(view) => kind.read(&self.items(view, a.byte_offset.unwrap_or_default().0, size, a.count.0)?),
+            None => {
+                // Zeros, which no bytes back: as many as the sparse part could sensibly fill.
+                let Some(sparse) = &a.sparse else { return Err(bad("has no bufferView")) };
+                let held: usize = self.buffers.iter().map(|b| b.len()).sum();
+                if a.count.0 < sparse.count.0 || a.count.0 > (held as u64).max(1 << 16) {
+                    return Err(bad("claims more items than the file has bytes"));
+                }
+                vec![0.0; a.count.0 as usize * components]
+            }
+        };
+        if let Some(s) = &a.sparse {
+            let Checked::Valid(IndexComponentType(index)) = s.indices.component_type else {
+                return Err(bad("its sparse indices have no valid type"));
+            };
+            let at = Kind(index).read(&self.items(s.indices.buffer_view, s.indices.byte_offset.0, index.size(), s.count.0)?);
+            let new = kind.read(&self.items(s.values.buffer_view, s.values.byte_offset.0, size, s.count.0)?);
+            for (i, new) in at.into_iter().zip(new.chunks_exact(components)) {
+                let first = i as usize * components;
+                let old = values.get_mut(first..first + components);
+                old.ok_or_else(|| bad("its sparse indices leave it"))?.copy_from_slice(new);
+            }
+        }
+        Ok(Raw { values, components, kind })
+    }
+}
+
+/// Items of one size at equal distances, all inside `data`.
+struct Items<'a> {
+    data: &'a [u8],
+    size: usize,
+    stride: usize,
+    count: usize,
+}
+
+/// An accessor's components in a row.
+struct Raw {
+    values: Vec<f64>,
+    components: usize,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy)]
+struct Kind(ComponentType);
+
+impl Kind {
+    fn read(self, items: &Items<'_>) -> Vec<f64> {
+        let step = self.0.size();
+        let mut out = Vec::with_capacity(items.count * (items.size / step));
+        for i in 0..items.count {
+            let item = &items.data[i * items.stride..i * items.stride + items.size];
+            out.extend(item.chunks_exact(step).map(|b| match self.0 {
+                ComponentType::I8 => f64::from(b[0] as i8),
+                ComponentType::U8 => f64::from(b[0]),
+                ComponentType::I16 => f64::from(i16::from_le_bytes([b[0], b[1]])),
+                ComponentType::U16 => f64::from(u16::from_le_bytes([b[0], b[1]])),
+                ComponentType::U32 => f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+                ComponentType::F32 => f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+            }));
+        }
+        out
+    }
+
+    /// glTF 2.0, section 3.11: signed integers c / (2^(b-1) - 1) but not below -1, unsigned ones c / (2^b - 1).
+    fn normalized(self, v: f64) -> f32 {
+        let v = match self.0 {
+            ComponentType::I8 => (v / 127.0).max(-1.0),
+            ComponentType::U8 => v / 255.0,
+            ComponentType::I16 => (v / 32767.0).max(-1.0),
+            ComponentType::U16 => v / 65535.0,
+            ComponentType::U32 | ComponentType::F32 => v,
+        };
+        v as f32
+    }
+}
+
+/// The bytes behind a URI: `data:...;base64,...`, or a file beside the document.
+pub(super) fn uri_bytes(path: &Path, uri: &str) -> Result<Vec<u8>, String> {
+    if let Some(rest) = uri.strip_prefix("data:") {
+        let (head, body) = rest.split_once(',').ok_or("its data URI has no comma")?;
+        if !head.ends_with(";base64") {
+            return Err("its data URI is not base64".into());
+        }
+        let engine = base64::engine::GeneralPurpose::new(
+            &base64::alphabet::STANDARD,
+            base64::engine::GeneralPurposeConfig::new()
+                .with_decode_padding_mode(base64::engine::DecodePaddingMode::Indifferent),
+        );
+        return engine.decode(body.trim()).map_err(|e| format!("its data URI: {e}"));
+    }
+    if uri.contains("://") {
+        return Err(format!("\"{}\" is on the network; only files are read", bytes::excerpt(uri, 80)));
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    bytes::read(&mtl::resolve(folder, &unescaped(uri))).map_err(|e| e.to_string())
+}
+
+/// RFC 3986, section 2.1: %XX is a byte.
+pub(super) fn unescaped(uri: &str) -> String {
+    let mut out = vec![];
+    let mut rest = uri.as_bytes();
+    while let Some((&b, after)) = rest.split_first() {
+        let hex = (b == b'%').then(|| after.get(..2).and_then(|h| std::str::from_utf8(h).ok())).flatten();
+        match hex.and_then(|h| u8::from_str_radix(h, 16).ok()) {
+            Some(v) => {
+                out.push(v);
+                rest = &after[2..];
+            }
+            None => {
+                out.push(b);
+                rest = after;
+            }
+        }
+    }
+    String::from_utf8_lossy(&out).into_owned()
+}
