@@ -174,7 +174,7 @@ pub(super) fn bunny(spacing: f32, seed: u32) -> Solid {
         s.egg(v(14.4, 23.4, 3.9 * z), v(4.0, 3.2, 2.6), Mat3::IDENTITY, 1.4);
         s.carve_egg(v(16.6, 28.2, 5.4 * z), v(1.9, 1.6, 1.1), turn(0.0, -20.0 * z, 0.0), 0.6);
         s.ball(v(16.2, 28.1, 4.5 * z), 1.35, 0.1);
-        s.egg(v(16.0, 29.6, 4.5 * z), v(2.0, 0.6, 1.0), turn(0.0, 0.0, -12.0), 0.5);
+        s.egg(v(16.0, 29.6, 4.5 * z), v(1.9, 0.5, 0.9), turn(0.0, 0.0, 8.0), 0.5);
         // Ear: a long spoon, hollow in front.
         let axes = turn(9.0 * z + 4.0, 0.0, 0.0) * turn(0.0, 20.0 * z, 20.0 + 6.0 * z);
         let center = v(7.4 - 0.9 * z, 36.2, 4.6 * z);
@@ -192,7 +192,7 @@ pub(super) fn bunny(spacing: f32, seed: u32) -> Solid {
         }
     }
     s.ball(v(-20.0, 8.6, 0.0), 3.9, 1.2);
-    s.block(v(-3.0, 1.0, 0.0), v(14.0, 1.0, 9.0), 0.9, Mat3::IDENTITY, 1.5);
+    s.block(v(-3.0, 1.2, 0.0), v(11.0, 1.2, 9.0), 0.9, Mat3::IDENTITY, 1.5);
     s
 }
 
@@ -200,6 +200,6 @@ fn bunny_relief(p: Vec3, spacing: f32, seed: u32) -> f32 {
     // Tufts of fur on body and haunches, short hair on head, ears and feet.
     let furry = (1.0 - ((p.y - 20.0) / 5.0).clamp(0.0, 1.0)) * ((p.y - 3.0) / 3.0).clamp(0.0, 1.0);
     let swept = v(0.75 * p.x, p.y, p.z) + 1.2 * fbm(p, 7.0, 2, spacing, seed ^ 2);
-    0.55 * furry * (cells(swept, 2.9, spacing, seed) - 0.35)
+    0.40 * furry * (cells(swept, 2.9, spacing, seed) - 0.35)
         + (0.10 + 0.16 * furry) * fbm(v(0.35 * p.x, p.y, p.z), 1.4, 4, 0.6 * spacing, seed ^ 6)
 }

@@ -130,7 +130,6 @@ pub(super) fn easter(spacing: f32, seed: u32) -> Solid {
     s.block(v(0.0, 16.3, 2.9), v(2.4, 1.1, 1.6), 0.7, turn(-12.0, 0.0, 0.0), 0.7);
     s.block(v(0.0, 26.9, 1.9), v(4.3, 1.35, 1.5), 0.6, turn(-14.0, 0.0, 0.0), 0.6);
     s.block(v(0.0, 30.2, -0.8), v(3.9, 0.6, 3.0), 0.5, turn(-4.0, 0.0, 0.0), 0.8);
-    s.limb(v(0.0, 26.4, 2.4), 0.85, v(0.0, 21.7, 4.1), 1.15, 0.5);
     s.egg(v(0.0, 19.1, 3.6), v(2.5, 0.65, 1.0), turn(10.0, 0.0, 0.0), 0.3);
     s.egg(v(0.0, 17.75, 3.65), v(2.2, 0.65, 1.0), turn(-6.0, 0.0, 0.0), 0.3);
     s.carve_egg(v(0.0, 18.42, 4.9), v(2.4, 0.35, 0.8), Mat3::IDENTITY, 0.3);
@@ -153,6 +152,9 @@ pub(super) fn easter(spacing: f32, seed: u32) -> Solid {
         }
         s.egg(v(2.1 * x, 11.6, 3.3), v(1.7, 1.3, 0.7), Mat3::IDENTITY, 0.6);
     }
+    // The nose last, with its bridge filled, so that the eye sockets do not undercut it.
+    s.limb(v(0.0, 25.8, 1.9), 1.0, v(0.0, 22.0, 2.4), 1.2, 0.3);
+    s.limb(v(0.0, 26.4, 2.4), 0.85, v(0.0, 21.7, 4.1), 1.15, 0.5);
     s.ball(v(0.0, 6.0, 4.6), 0.6, 0.4);
     s
 }

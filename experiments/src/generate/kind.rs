@@ -101,7 +101,8 @@ pub struct PaperModel {
     pub triangles: u32,
 }
 
-/// The files that come nearest to the paper's models, one a kind, in the order of [`Kind::ALL`]. Dragon, bunny and Venus have
+/// The files that come nearest to the paper's models, one a kind, in the order of [`Kind::ALL`]; which way is up in each was read
+/// off its box (the paper's proportions) and its picture. Dragon, bunny and Venus have
 /// the paper's very counts; the others differ, and so do the totals of parks made of them.
 pub const PAPER_MODELS: [PaperModel; 8] = [
     model(Kind::Dragon, "statuary/dragon_vrip_res2.ply.gz", Up::Y, 0.0, 202_520),

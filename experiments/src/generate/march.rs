@@ -109,7 +109,7 @@ pub(super) fn march(solid: &Solid) -> Raw {
     let points = cells + 1;
     let layer = (points.x * points.y) as usize;
     let at = |i: UVec3| origin + i.as_vec3() * h;
-    let reach = 2.0 * (0.5 * BLOCK as f32 * h * 3.0_f32.sqrt()) + solid.relief_max();
+    let reach = 1.5 * (0.5 * BLOCK as f32 * h * 3.0_f32.sqrt()) + solid.relief_max();
     let busy: Vec<bool> = {
         let blocks = cells / BLOCK;
         (0..blocks.element_product())

@@ -18,10 +18,12 @@ mod sculpt;
 mod sdf;
 mod shade;
 mod shapes;
+#[cfg(test)]
+mod tests;
 
 pub use fit::{Up, fit_to_box};
 pub use kind::{Kind, PAPER_MODELS, PaperModel};
-pub use park::{PARK_2M, PARK_4M, PARK_8M, ParkScene, ParkSettings, Placement, layout, park};
+pub use park::{Layout, PARK_2M, PARK_4M, PARK_8M, ParkScene, ParkSettings, Placement, layout, park, park_of};
 pub use sculpt::{LEAST_TRIANGLES, MOST_TRIANGLES, sculpt};
 
 /// Why a scene could not be generated.

@@ -23,7 +23,8 @@ use serde::{Deserialize, Serialize};
 use farfield_core::mesh::TriangleMesh;
 
 use super::GenerateError;
-use super::kind::Kind;
+use super::fit::fit_to_box;
+use super::kind::{Kind, PaperModel};
 use super::sculpt::{LEAST_TRIANGLES, sculpt};
 
 /// The paper's total of its 2M scene.
@@ -43,7 +44,7 @@ const HALF_AREA: DVec2 = DVec2::new(825.0, 1017.5);
 /// Free way between any two statues, scene units: two people pass.
 const CLEARANCE: f64 = 6.0;
 /// Real meshes that are fitted by height have wider footprints than the paper's box by up to this factor.
-const FOOTPRINT_SLACK: f64 = 1.2;
+const FOOTPRINT_SLACK: f64 = 1.25;
 /// How far the chosen prefix may be off the requested total before the meshes are adapted.
 const TOLERANCE: f64 = 0.01;
 
@@ -119,6 +120,26 @@ pub fn park(settings: &ParkSettings) -> Result<ParkScene, GenerateError> {
         .map(|&kind| Ok((kind.name(), sculpt(kind, layout.mesh_triangles[kind as usize], settings.seed)?)))
         .collect::<Result<_, GenerateError>>()?;
     Ok(ParkScene { meshes, placements: layout.placements, half_area: layout.half_area })
+}
+
+/// The same park of given meshes, one a kind in the order of [`Kind::ALL`], as they come from their files: each is turned as
+/// `models` says and scaled uniformly to the paper's height. Its total follows the files: `settings.triangles` chooses the
+/// prefix by the paper's counts.
+///
+/// # Errors
+/// If the total is out of [`LEAST_TOTAL`]..=[`MOST_TOTAL`], or a mesh cannot be fitted.
+pub fn park_of(
+    settings: &ParkSettings,
+    models: &[PaperModel; 8],
+    meshes: [TriangleMesh; 8],
+) -> Result<ParkScene, GenerateError> {
+    let layout = layout(settings)?;
+    let mut named = Vec::with_capacity(meshes.len());
+    for (mut mesh, model) in meshes.into_iter().zip(models) {
+        fit_to_box(&mut mesh, model.up, model.yaw_deg, model.kind.size())?;
+        named.push((model.kind.name(), mesh));
+    }
+    Ok(ParkScene { meshes: named, placements: layout.placements, half_area: layout.half_area })
 }
 
 /// Who stands where; also for parks of given meshes, whose totals follow the files.

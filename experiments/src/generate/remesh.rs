@@ -18,17 +18,24 @@ use super::sdf::Solid;
 /// Evens out the mesh: `rounds` of tangential relaxation and projection.
 pub(super) fn relax(raw: &mut Raw, solid: &Solid, rounds: usize) {
     let fans = Fans::of(raw);
+    let most = 0.5 * solid.spacing();
     for _ in 0..rounds {
         let positions = &raw.positions;
         let moved: Vec<Vec3> = (0..positions.len())
             .into_par_iter()
             .map(|i| {
                 let p = positions[i];
-                let (normal, d) = normal_and_distance(solid, p);
+                let (mut normal, mut mean) = (Vec3::ZERO, Vec3::ZERO);
                 let ring = fans.ring(i);
-                let mean = ring.iter().map(|&[a, _]| positions[a as usize]).sum::<Vec3>() / ring.len() as f32;
+                for &[a, b] in ring {
+                    let (a, b) = (positions[a as usize], positions[b as usize]);
+                    normal += (a - p).cross(b - p);
+                    mean += a / ring.len() as f32;
+                }
+                // The mesh's own normal is good enough here and saves the gradient's four evaluations.
+                let Some(normal) = normal.try_normalize() else { return p };
                 let along = (mean - p) - normal * normal.dot(mean - p);
-                p + 0.6 * along - normal * d.clamp(-0.5 * solid.spacing(), 0.5 * solid.spacing())
+                p + 0.6 * along - normal * solid.distance(p).clamp(-most, most)
             })
             .collect();
         accept(raw, &fans, moved);
@@ -39,7 +46,7 @@ pub(super) fn relax(raw: &mut Raw, solid: &Solid, rounds: usize) {
 pub(super) fn project(raw: &mut Raw, solid: &Solid, steps: usize) {
     let fans = Fans::of(raw);
     for _ in 0..steps {
-        let moved = raw.positions.par_iter().map(|&p| onto(solid, p, 1)).collect();
+        let moved = raw.positions.par_iter().map(|&p| onto(solid, p)).collect();
         accept(raw, &fans, moved);
     }
 }
@@ -102,20 +109,10 @@ impl Fans {
     }
 }
 
-fn normal_and_distance(solid: &Solid, p: Vec3) -> (Vec3, f32) {
-    let (gradient, d) = solid.gradient(p, 0.25 * solid.spacing());
-    let length = gradient.length();
-    if length < 1e-6 { (Vec3::Y, 0.0) } else { (gradient / length, d / length) }
-}
-
-fn onto(solid: &Solid, mut p: Vec3, steps: usize) -> Vec3 {
-    let most = 0.5 * solid.spacing();
-    for _ in 0..steps {
-        let (gradient, _) = solid.gradient(p, 0.1 * solid.spacing());
-        let d = solid.distance(p) / gradient.length_squared().max(0.1);
-        p -= (gradient * d).clamp_length_max(most);
-    }
-    p
+/// One Newton step: p - d grad d / |grad d|^2, no longer than half a lattice spacing.
+fn onto(solid: &Solid, p: Vec3) -> Vec3 {
+    let (gradient, d) = solid.gradient(p, 0.1 * solid.spacing());
+    p - (gradient * (d / gradient.length_squared().max(0.1))).clamp_length_max(0.5 * solid.spacing())
 }
 
 /// Moves the vertices, but for those whose triangles would turn over or vanish.

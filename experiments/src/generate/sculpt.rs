@@ -20,7 +20,7 @@ pub const LEAST_TRIANGLES: u32 = 200;
 pub const MOST_TRIANGLES: u32 = 4_000_000;
 
 /// Triangles that the mesh is made with before it is collapsed to its count, within the next two bounds.
-const OVERSAMPLED: f32 = 120_000.0;
+const OVERSAMPLED: f32 = 80_000.0;
 /// At least so many times the count.
 const LEAST_FINER: f32 = 1.35;
 /// At most so many times the count.
@@ -136,8 +136,8 @@ fn palette(kind: Kind) -> Palette {
         Kind::Dragon => of(rgb(118, 152, 122), rgb(38, 58, 48), rgb(158, 150, 96), 0.45),
         Kind::Bunny => of(rgb(196, 176, 150), rgb(96, 76, 58), rgb(150, 140, 116), 0.4),
         Kind::Statue => of(rgb(222, 218, 208), rgb(120, 110, 98), rgb(186, 178, 160), 0.4),
-        Kind::Cattle => of(rgb(112, 78, 52), rgb(40, 26, 18), rgb(84, 110, 92), 0.35),
-        Kind::Horse => of(rgb(132, 104, 66), rgb(46, 34, 24), rgb(92, 134, 112), 0.5),
+        Kind::Cattle => of(rgb(150, 106, 72), rgb(62, 40, 28), rgb(104, 132, 110), 0.35),
+        Kind::Horse => of(rgb(164, 130, 84), rgb(62, 46, 32), rgb(108, 152, 128), 0.5),
         Kind::Easter => of(rgb(142, 136, 126), rgb(70, 66, 60), rgb(164, 160, 112), 0.5),
         Kind::Camel => of(rgb(190, 156, 108), rgb(94, 70, 44), rgb(160, 140, 104), 0.35),
         Kind::Venus => of(rgb(236, 230, 218), rgb(150, 138, 122), rgb(206, 194, 172), 0.35),

@@ -222,7 +222,7 @@ struct Index {
 
 impl Index {
     /// Cubes along the longest side.
-    const RESOLUTION: f32 = 40.0;
+    const RESOLUTION: f32 = 64.0;
 
     fn of(solid: &Solid) -> Self {
         let (lo, hi) = solid.bounds();
