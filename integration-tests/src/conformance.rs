@@ -1,12 +1,48 @@
-//! What every backend must do alike, as tests that take a backend to try.
+//! What every backend must do alike, as one test that takes the backend to try.
+//!
+//! Expectations are computed by hand, pixel by pixel, wherever a scene is simple enough; two scenes of random triangles are held
+//! against the reference backend. Rasterisers and ray casters differ at silhouettes: nothing is asked of a pixel closer than a
+//! pixel to an edge, and comparisons with the reference allow for a share of such pixels.
+//!
+//! What is fixed here beyond the words of `farfield_core::draw` and `payload`:
+//! - Facing follows the winding in the local frame, after placement. A placement that mirrors turns front faces into back
+//!   faces; whoever imports mirrored instances reverses their triangles.
+//! - A two-sided surface's normal is turned when n . (point - eye) > 0, whatever its winding.
+//! - A surface pass clears its target: albedo 0, normal 0, depth infinite, object 0 where nothing is drawn.
+//! - A pass without draws, a chunk without triangles and a part without triangles are no errors.
+
+mod contract;
+mod facing;
+mod fixture;
+mod geometry;
+mod light;
+mod paint;
+mod projected;
+mod reference;
 
 use farfield_core::backend::Backend;
 use farfield_core::scene::Scene;
 
-/// Tries a backend against everything that draw lists promise. `make` makes one for a scene, with nothing uploaded.
+/// Makes a backend for a scene, with nothing uploaded.
+pub type Make<'a> = &'a dyn Fn(&Scene) -> Box<dyn Backend>;
+
+/// Tries a backend against everything that draw lists promise.
 ///
 /// # Panics
-/// Where the backend differs: it is a test's body.
-pub fn suite(make: &dyn Fn(&Scene) -> Box<dyn Backend>) {
-    let _ = make;
+/// Where the backend differs, saying in what: it is a test's body.
+pub fn suite(make: Make<'_>) {
+    let parts: [(&str, fn(Make<'_>)); 8] = [
+        ("contract", contract::all),
+        ("geometry", geometry::all),
+        ("facing", facing::all),
+        ("paint", paint::all),
+        ("projected", projected::all),
+        ("light", light::all),
+        ("reference: soup", reference::soup),
+        ("reference: instances", reference::instances),
+    ];
+    for (name, part) in parts {
+        println!("conformance: {name}");
+        part(make);
+    }
 }
