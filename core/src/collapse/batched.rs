@@ -11,7 +11,7 @@
 //!
 //! What limits it: about 3 prices an edge of the input for a reduction to a tenth, then the collapses themselves.
 
-use super::mesh::{LiveMesh, Marks};
+use super::mesh::{LiveMesh, Marks, others};
 use super::rules::Rules;
 use super::{BLOCK, Candidate, Collapsed, Cost, Reach, Settings, resolve};
 
@@ -24,9 +24,10 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
     let mut touched = Marks::new(mesh.vertices());
     let mut edges = Edges {
         living: (0..mesh.all_triangles() as u32).collect(),
+        odd: (0..mesh.vertices() as u32).filter(|&v| mesh.is_odd(v)).collect(),
         ends: Vec::new(),
         order: Vec::new(),
-        block: Vec::new(),
+        block: vec![[0; 2]; BLOCK + 3],
         out: Vec::new(),
     };
     let mut chosen: Vec<([u32; 2], f32)> = Vec::new();
@@ -116,6 +117,8 @@ impl<C: Cost + ?Sized> Batched<'_, C> {
 struct Edges {
     /// Triangles that were alive at the last pass.
     living: Vec<u32>,
+    /// The odd vertices.
+    odd: Vec<u32>,
     /// Edges that may be collapsed.
     ends: Vec<[u32; 2]>,
     /// A sortable price in the upper half, the edge's index in the lower.
@@ -125,34 +128,47 @@ struct Edges {
 }
 
 impl Edges {
-    /// Fills `order` with every edge that may be collapsed.
+    /// Fills `order` with every edge that may be collapsed, some twice where the mesh is not a manifold.
     fn price<C: Cost + ?Sized>(&mut self, mesh: &LiveMesh, cost: &mut C, max_cost: f32) {
-        self.living.retain(|&t| mesh.is_alive(t));
         self.ends.clear();
         self.order.clear();
-        self.block.clear();
+        self.living.retain(|&t| mesh.is_alive(t));
+        let mut filled = 0;
         for i in 0..self.living.len() {
+            // A balanced edge runs up its ids in one of its triangles. No branch: it would be mispredicted every other time.
             let [a, b, c] = mesh.corners(self.living[i]);
             for [a, b] in [[a, b], [b, c], [c, a]] {
-                // Every edge of an orientable surface runs up its ids in one of its triangles.
-                if a < b {
-                    self.block.push([a, b]);
-                } else if mesh.is_odd(a) && mesh.is_odd(b) && !runs(mesh, b, a) {
-                    self.block.push([b, a]);
-                }
+                self.block[filled] = [a, b];
+                filled += (a < b) as usize;
             }
-            if self.block.len() >= BLOCK {
-                self.ask(mesh, cost, max_cost);
+            if filled >= BLOCK {
+                self.ask(mesh, cost, max_cost, std::mem::take(&mut filled));
             }
         }
-        self.ask(mesh, cost, max_cost);
+        self.odd.iter_mut().for_each(|v| *v = mesh.survivor(*v));
+        self.odd.sort_unstable();
+        self.odd.dedup();
+        for i in 0..self.odd.len() {
+            let a = self.odd[i];
+            for &t in mesh.triangles_of(a) {
+                let [b, _] = others(mesh.corners(t), a);
+                if a > b && mesh.is_odd(b) && !runs(mesh, b, a) {
+                    self.block[filled] = [b, a];
+                    filled += 1;
+                }
+                if filled >= BLOCK {
+                    self.ask(mesh, cost, max_cost, std::mem::take(&mut filled));
+                }
+            }
+        }
+        self.ask(mesh, cost, max_cost, filled);
     }
 
-    fn ask<C: Cost + ?Sized>(&mut self, mesh: &LiveMesh, cost: &mut C, max_cost: f32) {
-        self.out.clear();
-        self.out.resize(self.block.len(), Candidate::FORBIDDEN);
-        cost.costs(mesh, &self.block, &mut self.out);
-        for (ends, c) in self.block.drain(..).zip(&self.out) {
+    /// Prices the first `filled` edges of `block`.
+    fn ask<C: Cost + ?Sized>(&mut self, mesh: &LiveMesh, cost: &mut C, max_cost: f32, filled: usize) {
+        self.out.resize(filled, Candidate::FORBIDDEN);
+        cost.costs(mesh, &self.block[..filled], &mut self.out);
+        for (&ends, c) in self.block.iter().zip(&self.out) {
             if c.cost <= max_cost && c.cost < f32::INFINITY {
                 self.order.push((sortable(c.cost) as u64) << 32 | self.ends.len() as u64);
                 self.ends.push(ends);
@@ -178,10 +194,7 @@ impl Edges {
 
 /// Whether a triangle runs from a to b.
 fn runs(mesh: &LiveMesh, a: u32, b: u32) -> bool {
-    mesh.triangles_of(a).iter().any(|&t| {
-        let [x, y, z] = mesh.corners(t);
-        [[x, y], [y, z], [z, x]].contains(&[a, b])
-    })
+    mesh.triangles_of(a).iter().any(|&t| others(mesh.corners(t), a)[0] == b)
 }
 
 /// An integer that orders as the number does.

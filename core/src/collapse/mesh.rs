@@ -197,6 +197,14 @@ impl LiveMesh {
         self.unit
     }
 
+    /// Where a vertex has ended up.
+    pub(super) fn survivor(&self, mut vertex: u32) -> u32 {
+        while self.vertices[vertex as usize].remap != vertex {
+            vertex = self.vertices[vertex as usize].remap;
+        }
+        vertex
+    }
+
     /// Number of triangles of the input, dead ones included.
     pub(super) fn all_triangles(&self) -> usize {
         self.triangles.len()
