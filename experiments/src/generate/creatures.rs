@@ -62,8 +62,8 @@ pub(super) fn dragon(spacing: f32, seed: u32) -> Solid {
 fn crest_and_belly(s: &mut Solid) {
     let points = spline(&SPINE, 5);
     let at = |i: usize| v(points[i][0], points[i][1], points[i][2]);
-    for i in 1..points.len() - 2 {
-        let (p, r) = (at(i), points[i][3]);
+    for (i, &[.., r]) in points.iter().enumerate().take(points.len() - 2).skip(1) {
+        let p = at(i);
         let along = (at(i + 1) - at(i - 1)).normalize();
         // The back is on the left of the way down the neck, in the plane of the coils.
         let back = (v(along.y, -along.x, 0.0) - along * v(along.y, -along.x, 0.0).dot(along)).normalize();

@@ -31,6 +31,9 @@ struct Case {
     middles: Vec<Vec<u8>>,
 }
 
+/// A layer of cells: triangles by vertex names, and the vertices.
+type Layer = (Vec<[u64; 3]>, Vec<(u64, Vec3)>);
+
 const MIDDLE: u8 = 12;
 const BLOCK: u32 = 4;
 
@@ -153,7 +156,7 @@ pub(super) fn march(solid: &Solid) -> Raw {
         let (low, axis) = EDGES[e as usize];
         index(cell + corner(low)) as u64 * 8 + u64::from(axis)
     };
-    let named: Vec<(Vec<[u64; 3]>, Vec<(u64, Vec3)>)> = (0..cells.z)
+    let named: Vec<Layer> = (0..cells.z)
         .into_par_iter()
         .map(|z| {
             let (mut triangles, mut vertices) = (Vec::new(), Vec::new());

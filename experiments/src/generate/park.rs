@@ -4,16 +4,17 @@
 //! are subsets of the larger ones. Here there is one endless seeded sequence of placements, and a park is a **prefix** of it:
 //!
 //! - the first eight are one of each kind; the first 64, 132 and 253 are the paper's 2M, 4M and 8M numbers, in an order
-//!   that keeps each prefix's mixture as even as it can be, all over the whole area;
-//! - beyond that, each further 253 have the 8M scene's mixture and stand in the frame by which the area grows, so that density stays
-//!   what it was: 64M is about eight times the area;
+//!   that keeps each prefix's mixture as even as it can be. The 2M scene grows outwards by quarters of the area, so that a small park
+//!   is a small place; from there to 8M the whole area fills up;
+//! - beyond that, each further 253 have the 8M scene's mixture and stand in the frame by which the area grows, so that
+//!   density stays what it was: 64M is about eight times the area;
 //! - the prefix taken is the one whose total is nearest to the request. If that is more than 1 % off (a dragon is a tenth of
 //!   the 2M scene), or the request is below one of each kind, all meshes get finer or coarser by the same factor.
 //!
 //! Positions are uniform by rejection: circles about the footprints, with some room between them, do not overlap. That takes
 //! O(statues^2) with fewer than ten tries a statue, some ms at 64M. Deviation: the paper does not say how it placed its statues.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3Swizzles};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -83,7 +84,7 @@ pub struct Placement {
 pub struct Layout {
     /// The statues; a park of a smaller total and the same seed has a prefix of them.
     pub placements: Vec<Placement>,
-    /// Half the area's extent in x and z; its middle is the origin.
+    /// Half the area's extent in x and z; its middle is the origin. Parks from 2M to 8M have the paper's 1650 x 2035.
     pub half_area: DVec2,
     /// Triangles of each kind's mesh if it is sculpted, in the order of [`Kind::ALL`].
     pub mesh_triangles: [u32; 8],
@@ -197,23 +198,19 @@ fn sequence() -> Vec<Kind> {
     out
 }
 
-/// Places statue after statue: block `b` of 253 stands in the rectangle of `b + 1` times the paper's area, but not in that of `b`.
+/// Places statue after statue, each in the frame of its index ([`frame`]).
 fn place(kinds: &[Kind], seed: u64) -> (Vec<Placement>, DVec2) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let block = sequence().len();
     let mut placements: Vec<Placement> = Vec::with_capacity(kinds.len());
     let mut half = HALF_AREA;
     for (i, &kind) in kinds.iter().enumerate() {
-        let inner = HALF_AREA * ((i / block) as f64).sqrt();
-        half = HALF_AREA * ((i / block + 1) as f64).sqrt();
+        let (inner, outer) = frame(i);
+        half = outer;
         let radius = reach(kind);
         let position = loop {
-            let p = DVec2::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0)) * (half - radius);
-            let in_frame = i < block || p.x.abs() > inner.x + radius || p.y.abs() > inner.y + radius;
-            let free = |q: &Placement| {
-                DVec2::new(q.position.x, q.position.z).distance(p) >= radius + reach(q.kind) + CLEARANCE
-            };
-            if in_frame && placements.iter().all(free) {
+            let p = DVec2::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0)) * (outer - radius);
+            let free = |q: &Placement| q.position.xz().distance(p) >= radius + reach(q.kind) + CLEARANCE;
+            if p.abs().cmpgt(inner).any() && placements.iter().all(free) {
                 break p;
             }
         };
@@ -221,6 +218,21 @@ fn place(kinds: &[Kind], seed: u64) -> (Vec<Placement>, DVec2) {
         placements.push(Placement { kind, position: DVec3::new(position.x, 0.0, position.y), yaw_rad, scale: 1.0 });
     }
     (placements, half)
+}
+
+/// Half extents of the rectangles between which statue `i` stands; areas go with the number of statues inside.
+fn frame(i: usize) -> (DVec2, DVec2) {
+    let [small, _, large] = [0, 1, 2].map(|s| Kind::ALL.iter().map(|k| k.paper_numbers()[s] as usize).sum::<usize>());
+    // In paper areas: quarters up to the 2M scene, then all of it up to the 8M scene, then one more for each 8M scene.
+    let (inner, outer) = if i < small {
+        let quarter = 4 * i / small;
+        (quarter as f64 / 4.0, (quarter + 1) as f64 / 4.0)
+    } else if i < large {
+        (0.0, 1.0)
+    } else {
+        ((i / large) as f64, (i / large + 1) as f64)
+    };
+    (HALF_AREA * inner.sqrt(), HALF_AREA * outer.sqrt())
 }
 
 /// Radius of the circle that holds a kind's footprint however it is turned, with room for real meshes.

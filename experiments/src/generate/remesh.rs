@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use farfield_core::Fault;
 use farfield_core::collapse::{LiveMesh, Placement, QuadricSettings, Quadrics, Settings, collapse};
+use farfield_core::mesh::TriangleMesh;
 
 use super::march::Raw;
 use super::sdf::Solid;
@@ -73,9 +74,19 @@ pub(super) fn reduce(raw: Raw, target: usize) -> Result<Raw, Fault> {
     Ok(Raw { positions, triangles })
 }
 
-/// Unit normals from the distance field's gradient.
+/// Unit normals: the field's, or where they are more than 60 degrees apart (the mesh is too coarse for what is there) the mesh's.
 pub(super) fn normals(raw: &Raw, solid: &Solid) -> Vec<Vec3> {
-    raw.positions.par_iter().map(|&p| solid.gradient(p, 0.35 * solid.detail()).0.normalize_or(Vec3::Y)).collect()
+    let mut own = TriangleMesh {
+        positions: raw.positions.clone(),
+        indices: raw.triangles.as_flattened().to_vec(),
+        ..Default::default()
+    };
+    own.smooth_normals();
+    let at = |(&p, &mesh): (&Vec3, &Vec3)| {
+        let field = solid.gradient(p, 0.35 * solid.detail()).0.normalize_or_zero();
+        if field.dot(mesh) > 0.5 { field } else { mesh }
+    };
+    raw.positions.par_iter().zip(&own.normals).map(at).collect()
 }
 
 /// Triangles around each vertex, as the opposite edges.
