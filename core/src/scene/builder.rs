@@ -44,6 +44,11 @@ impl SceneBuilder {
         self.placements.push(placement);
     }
 
+    /// Moves everything placed so far through the world.
+    pub fn shift(&mut self, by: DVec3) {
+        self.placements.iter_mut().for_each(|p| p.transform = DAffine3::from_translation(by) * p.transform);
+    }
+
     /// Builds the scene. Its local frame starts in the middle of everything placed, at the lowest point's height.
     ///
     /// # Errors
