@@ -25,7 +25,6 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
     let mut edges = Edges {
         living: (0..mesh.all_triangles() as u32).collect(),
         odd: (0..mesh.vertices() as u32).filter(|&v| mesh.is_odd(v)).collect(),
-        ends: Vec::new(),
         order: Vec::new(),
         block: vec![[0; 2]; BLOCK + 3],
         out: Vec::new(),
@@ -43,7 +42,7 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
         touched.clear();
         chosen.clear();
         for &key in &edges.order {
-            let (price, ends) = edges.read(key);
+            let (price, ends) = read(key);
             if chosen.len() >= wanted || price > limit || state.mesh.live_triangles() <= settings.min_triangles {
                 break;
             }
@@ -119,10 +118,8 @@ struct Edges {
     living: Vec<u32>,
     /// The odd vertices.
     odd: Vec<u32>,
-    /// Edges that may be collapsed.
-    ends: Vec<[u32; 2]>,
-    /// A sortable price in the upper half, the edge's index in the lower.
-    order: Vec<u64>,
+    /// Edges that may be collapsed, as [`sortable`].
+    order: Vec<u128>,
     block: Vec<[u32; 2]>,
     out: Vec<Candidate>,
 }
@@ -130,7 +127,6 @@ struct Edges {
 impl Edges {
     /// Fills `order` with every edge that may be collapsed, some twice where the mesh is not a manifold.
     fn price<C: Cost + ?Sized>(&mut self, mesh: &LiveMesh, cost: &mut C, max_cost: f32) {
-        self.ends.clear();
         self.order.clear();
         self.living.retain(|&t| mesh.is_alive(t));
         let mut filled = 0;
@@ -170,14 +166,9 @@ impl Edges {
         cost.costs(mesh, &self.block[..filled], &mut self.out);
         for (&ends, c) in self.block.iter().zip(&self.out) {
             if c.cost <= max_cost && c.cost < f32::INFINITY {
-                self.order.push((sortable(c.cost) as u64) << 32 | self.ends.len() as u64);
-                self.ends.push(ends);
+                self.order.push(sortable(c.cost, ends));
             }
         }
-    }
-
-    fn read(&self, key: u64) -> (f32, [u32; 2]) {
-        (price_of(key), self.ends[key as u32 as usize])
     }
 
     /// Keeps the cheapest `share` in `order`, sorted, and returns the price at which the pass should end.
@@ -188,7 +179,7 @@ impl Edges {
             self.order.truncate(keep);
         }
         self.order.sort_unstable();
-        if share < 1.0 && wanted < keep { price_of(self.order[wanted]) * SLACK } else { f32::MAX }
+        if share < 1.0 && wanted < keep { read(self.order[wanted]).0 * SLACK } else { f32::MAX }
     }
 }
 
@@ -197,14 +188,16 @@ fn runs(mesh: &LiveMesh, a: u32, b: u32) -> bool {
     mesh.triangles_of(a).iter().any(|&t| others(mesh.corners(t), a)[0] == b)
 }
 
-/// An integer that orders as the number does.
-fn sortable(price: f32) -> u32 {
+/// An integer that orders as (price, ends) do.
+fn sortable(price: f32, [a, b]: [u32; 2]) -> u128 {
     // + 0.0: -0 and 0 are one price.
     let bits = (price + 0.0).to_bits();
-    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
+    let bits = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
+    (bits as u128) << 64 | (a as u128) << 32 | b as u128
 }
 
-fn price_of(key: u64) -> f32 {
-    let bits = (key >> 32) as u32;
-    f32::from_bits(if bits >> 31 == 1 { bits & !(1 << 31) } else { !bits })
+fn read(key: u128) -> (f32, [u32; 2]) {
+    let bits = (key >> 64) as u32;
+    let price = f32::from_bits(if bits >> 31 == 1 { bits & !(1 << 31) } else { !bits });
+    (price, [(key >> 32) as u32, key as u32])
 }

@@ -37,6 +37,7 @@
 
 mod batched;
 mod exact;
+mod lanes;
 mod mesh;
 mod quadric;
 mod queue;
