@@ -3,9 +3,10 @@
 use std::ops::{ControlFlow, Range};
 
 use glam::{BVec4A, Vec3, Vec3A, Vec4};
-use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
+use obvhs::bvh2::leaf_collapser::collapse;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 use super::Ray;
 use crate::Aabb;
@@ -61,6 +62,19 @@ enum Binary {
     Inner(Box<[Binary; 2]>),
 }
 
+impl Binary {
+    /// The same tree with its runs' ends looked up.
+    fn map(self, ends: &[u32]) -> Self {
+        match self {
+            Self::Leaf(r) => Self::Leaf(ends[r.start as usize]..ends[r.end as usize]),
+            Self::Inner(c) => {
+                let [a, b] = *c;
+                Self::Inner(Box::new([a.map(ends), b.map(ends)]))
+            }
+        }
+    }
+}
+
 impl Tree {
     /// Builds over boxes with at most about `leaf` items a leaf. Boxes that are empty or not finite are left out.
     pub(super) fn build(boxes: &[Aabb], leaf: u32) -> Self {
@@ -74,30 +88,35 @@ impl Tree {
             return Self::default();
         }
         let bounds = kept.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]));
-        let centre = bounds.centre();
-        // Half a size at a time: a box from -MAX to MAX has no finite size.
-        let half = (bounds.max * 0.5 - bounds.min * 0.5).max_element();
-        let scale = if half > 0.0 { (0.5 / half).min(f32::MAX) } else { 1.0 };
-        let items: Vec<Item> = kept
-            .iter()
-            .map(|&i| {
-                let unit = |p: Vec3| Vec3A::from((p - centre) * scale).clamp(Vec3A::NEG_ONE, Vec3A::ONE);
-                Item(obvhs::aabb::Aabb::new(unit(boxes[i as usize].min), unit(boxes[i as usize].max)))
-            })
-            .collect();
-        let params = BvhBuildParams { max_prims_per_leaf: leaf, ..BvhBuildParams::medium_build() };
-        let flat = build_bvh2(&items, params, &mut std::time::Duration::default());
-
-        let mut order: Vec<u32> = flat.primitive_indices.iter().map(|&i| kept[i as usize]).collect();
-        let mut binary = unfold(&flat, 0, 0);
-        if binary.is_none() {
-            order = kept;
-            binary = Some(balanced(&mut order, 0, boxes, leaf as usize));
+        // Equal boxes are one item to the clustering, which would chain them up.
+        let key = |i: u32| {
+            let b = &boxes[i as usize];
+            [b.min, b.max].map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits))
+        };
+        let mut order = kept;
+        order.sort_by_key(|&i| (key(i), i));
+        let starts: Vec<u32> =
+            (0..order.len()).filter(|&k| k == 0 || key(order[k - 1]) != key(order[k])).map(|k| k as u32).collect();
+        let mut groups: Vec<u32> = (0..starts.len() as u32).collect();
+        let first = |g: u32| boxes[order[starts[g as usize] as usize] as usize];
+        let flat = cluster(&groups.iter().map(|&g| first(g)).collect::<Vec<_>>(), &bounds, leaf);
+        let binary = match unfold(&flat, 0, 0) {
+            Some(b) => {
+                groups = flat.primitive_indices;
+                b
+            }
+            None => balanced(&mut groups, 0, &first, leaf as usize),
+        };
+        // From groups to their items: runs of groups become runs of items.
+        let mut ends = vec![0];
+        let mut items = Vec::with_capacity(order.len());
+        for g in groups {
+            let end = starts.get(g as usize + 1).map_or(order.len(), |&e| e as usize);
+            items.extend_from_slice(&order[starts[g as usize] as usize..end]);
+            ends.push(items.len() as u32);
         }
-        let mut tree = Self { nodes: vec![], order, bounds: Some(bounds) };
-        if let Some(b) = binary {
-            tree.widen(&b, boxes);
-        }
+        let mut tree = Self { nodes: vec![], order: items, bounds: Some(bounds) };
+        tree.widen(&binary.map(&ends), boxes);
         tree
     }
 
@@ -252,6 +271,31 @@ impl Tree {
     }
 }
 
+/// obvhs's medium build, step by step: its helper would check the tree by recursion in debug builds, however deep it is. Boxes
+/// are scaled to the unit cube and blown up a little, so that areas tell them apart even along a line.
+fn cluster(boxes: &[Aabb], bounds: &Aabb, leaf: u32) -> Bvh2 {
+    let centre = bounds.centre();
+    // Half a size at a time: a box from -MAX to MAX has no finite size.
+    let half = (bounds.max * 0.5 - bounds.min * 0.5).max_element();
+    let scale = if half > 0.0 { (0.5 / half).min(f32::MAX) } else { 1.0 };
+    let unit = |p: Vec3| Vec3A::from((p - centre) * scale).clamp(Vec3A::NEG_ONE, Vec3A::ONE);
+    let item = |b: &Aabb| Item(obvhs::aabb::Aabb::new(unit(b.min) - 1e-6, unit(b.max) + 1e-6));
+    let items: Vec<Item> = boxes.iter().map(item).collect();
+    let indices = (0..boxes.len() as u32).collect();
+    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
+        PlocSearchDistance::Medium,
+        &items,
+        indices,
+        SortPrecision::U64,
+        3,
+    );
+    let mut optimizer = ReinsertionOptimizer::default();
+    optimizer.run(&mut tree, 0.05, None);
+    collapse(&mut tree, leaf, 3.0);
+    optimizer.run(&mut tree, 0.1, None);
+    tree
+}
+
 /// The subtree at a node; `None` where it is too deep.
 fn unfold(flat: &Bvh2, node: usize, depth: usize) -> Option<Binary> {
     let n = flat.nodes.get(node)?;
@@ -266,15 +310,14 @@ fn unfold(flat: &Bvh2, node: usize, depth: usize) -> Option<Binary> {
 }
 
 /// Halves the items again and again by their centres along the longest axis: at most log2(n) deep, whatever they are.
-fn balanced(order: &mut [u32], start: u32, boxes: &[Aabb], leaf: usize) -> Binary {
-    if order.len() <= leaf.max(1) {
-        return Binary::Leaf(start..start + order.len() as u32);
+fn balanced(items: &mut [u32], start: u32, of: &impl Fn(u32) -> Aabb, leaf: usize) -> Binary {
+    if items.len() <= leaf.max(1) {
+        return Binary::Leaf(start..start + items.len() as u32);
     }
-    let centre = |i: u32| boxes[i as usize].centre();
-    let size = Aabb::of(order.iter().map(|&i| centre(i))).size();
+    let size = Aabb::of(items.iter().map(|&i| of(i).centre())).size();
     let axis = (0..3).fold(0, |a, k| if size[k] > size[a] { k } else { a });
-    order.sort_by(|&a, &b| centre(a)[axis].total_cmp(&centre(b)[axis]).then(a.cmp(&b)));
-    let (low, high) = order.split_at_mut(order.len() / 2);
+    items.sort_by(|&a, &b| of(a).centre()[axis].total_cmp(&of(b).centre()[axis]).then(a.cmp(&b)));
+    let (low, high) = items.split_at_mut(items.len() / 2);
     let middle = start + low.len() as u32;
-    Binary::Inner(Box::new([balanced(low, start, boxes, leaf), balanced(high, middle, boxes, leaf)]))
+    Binary::Inner(Box::new([balanced(low, start, of, leaf), balanced(high, middle, of, leaf)]))
 }

@@ -70,7 +70,7 @@ impl Triangle {
             return None;
         }
         let t = (e.dot(row(ray.shear[2]).as_dvec3()) / sum) as f32;
-        if !(ray.t_min <= t && t <= t_max) {
+        if !(ray.t_min <= t && t <= t_max && t.is_finite()) {
             return None;
         }
         let w = e / sum;
