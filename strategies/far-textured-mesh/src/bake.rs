@@ -1,0 +1,186 @@
+//! One cell: its pieces in parallel, then atlases, payloads, claims and the index in a fixed order.
+
+use farfield_core::claim::{Claim, Quantity};
+use farfield_core::context::{Context, collect};
+use farfield_core::id::LocalPayload;
+use farfield_core::payload::{Part, Payload, ProjectedPart, Projector};
+use farfield_core::strategy::{CellJob, LeftOut, Sink};
+use farfield_core::{Aabb, Camera, Fault};
+use glam::{Mat4, Vec3};
+
+use crate::TexturedLodMesh;
+use crate::atlas::{Slot, blank, pack, write};
+use crate::index::{Atlas, Entry, Index};
+use crate::mesh::{Baked, simplify};
+use crate::object::Piece;
+use crate::pieces::pieces;
+
+/// Layers of an atlas, about: 8 of 2048 x 2048 are 256 MiB of albedo and normals.
+const MAX_LAYERS: u32 = 8;
+
+/// Bakes a cell; the far chunks do not meet its region.
+pub(crate) fn bake(own: &TexturedLodMesh, job: &CellJob<'_>, out: &dyn Sink, cx: &Context<'_>) -> Result<Vec<u8>, Fault> {
+    let mut work: Vec<(u32, Piece)> = vec![];
+    let mut index = Index::default();
+    for (split, s) in job.cell.splits.iter().enumerate() {
+        let (found, plain) = pieces(job.scene, &s.far, job.cell.outline.centre, job.views.near);
+        work.extend(found.into_iter().map(|p| (split as u32, p)));
+        index.plain.push(plain);
+    }
+    let mut baked = collect(cx.run, work.len(), &|i| simplify(own, job, &work[i].1, cx))?;
+    report(&baked, &index, out);
+
+    let groups: Vec<Vec<[u32; 2]>> = baked
+        .iter()
+        .map(|b| b.iter().flat_map(|b| &b.views).map(|v| v.texels.size).collect())
+        .collect();
+    let packing = pack(&groups, own.atlas_px, MAX_LAYERS)?;
+    let atlas_id = |a: u32| LocalPayload(work.len() as u32 + a);
+    for (a, &(side, layers)) in packing.atlases.iter().enumerate() {
+        cx.check()?;
+        let mut part = blank(side, layers);
+        let mut bounds = Aabb::EMPTY;
+        for (i, slots) in packing.slots.iter().enumerate() {
+            let Some(b) = baked[i].as_mut().filter(|_| slots.first().is_some_and(|s| s.atlas as usize == a)) else {
+                continue;
+            };
+            bounds = bounds.union(work[i].1.bounds);
+            for (slot, view) in slots.iter().zip(&mut b.views) {
+                write(&mut part, slot, &view.texels);
+                view.texels = Default::default();
+            }
+        }
+        let origin = job.cell.outline.centre.as_dvec3();
+        let payload = Payload { origin, bounds, parts: vec![Part::Atlas(part)] };
+        let id = atlas_id(a as u32);
+        index.atlases.push(Atlas { payload: id.0, bounds, bytes: payload.texture_bytes() });
+        out.put(id, &payload)?;
+    }
+
+    for (i, b) in baked.into_iter().enumerate() {
+        let Some(b) = b else { continue };
+        let (split, piece) = &work[i];
+        let slots = &packing.slots[i];
+        let projectors: Vec<Projector> = b
+            .views
+            .iter()
+            .zip(slots)
+            .map(|(v, slot)| projector(&v.camera, v.offset, slot, atlas_id(slot.atlas)))
+            .collect();
+        let (hole_px, error_px, size_px) = (b.hole_px, b.error_px, b.size_px);
+        let payload = payload(b, &projectors);
+        let id = LocalPayload(i as u32);
+        if let Some(max) = hole_px {
+            out.claim(Claim { quantity: Quantity::HoleWidthPx, payload: Some(id), max });
+        }
+        let shows = |k: &u32| {
+            let s = &job.cell.sectors[*k as usize];
+            s.split.0 == *split && !s.seen.intersection(&piece.chunks).is_empty()
+        };
+        let sectors = (0..job.cell.sectors.len() as u32).filter(shows).collect();
+        index.meshes.push(Entry {
+            payload: id.0,
+            parts: payload.parts.len() as u16,
+            object: piece.object.0,
+            split: *split,
+            sectors,
+            bounds: payload.bounds,
+            bytes: mesh_bytes(&payload),
+            error_px,
+            size_px,
+            atlas: slots.first().map(|s| s.atlas),
+        });
+        out.put(id, &payload)?;
+    }
+    index.encode()
+}
+
+/// Says what the cell turned out not to need.
+fn report(baked: &[Option<Baked>], index: &Index, out: &dyn Sink) {
+    let say = |stage: &str, reason: String| {
+        out.left_out(LeftOut { stage: stage.into(), reason, decided: "build".into() });
+    };
+    if !baked.is_empty() && baked.iter().flatten().all(|b| b.passes) {
+        say("captures from neighbouring cells", "every object passes the view test".into());
+    }
+    let hidden = baked.iter().filter(|b| b.is_none()).count();
+    if hidden > 0 {
+        say("meshes", format!("{hidden} objects turn away from the whole cell"));
+    }
+    let plain: usize = index.plain.iter().map(|p| p.len()).sum();
+    if plain > 0 {
+        say("textured meshes", format!("{plain} chunks reach round the cell and are drawn as they are"));
+    }
+}
+
+fn payload(b: Baked, projectors: &[Projector]) -> Payload {
+    let mut bounds = Aabb::EMPTY;
+    let parts: Vec<Part> = b
+        .parts
+        .into_iter()
+        .map(|(mesh, views)| {
+            // Outwards by a rounding: positions are sums in 32 bits.
+            let at = |p: &Vec3| (p.as_dvec3() + b.origin).as_vec3();
+            bounds = bounds.union(Aabb::of(mesh.positions.iter().map(at)));
+            if projectors.is_empty() {
+                Part::Mesh(mesh)
+            } else {
+                Part::Projected(ProjectedPart { mesh, views, projectors: projectors.to_vec() })
+            }
+        })
+        .collect();
+    Payload { origin: b.origin, bounds, parts }
+}
+
+/// Position and normal 12 bytes each, albedo 4 a vertex; three indices and a view set a triangle; 100 bytes a projector.
+fn mesh_bytes(p: &Payload) -> u64 {
+    let of = |m: &farfield_core::payload::MeshPart| m.positions.len() as u64 * 28 + m.indices.len() as u64 * 4;
+    p.parts
+        .iter()
+        .map(|part| match part {
+            Part::Mesh(m) => of(m),
+            Part::Projected(q) => of(&q.mesh) + q.views.len() as u64 * 4 + q.projectors.len() as u64 * 100,
+            Part::Atlas(_) => 0,
+        })
+        .sum()
+}
+
+/// The projector of a view. With v = p + offset (from the eye) and z = v . forward the picture has
+///
+/// ```text
+/// x = ((v . right) / z - left) sx,   sx = width / (right_tan - left)      pixels from the left
+/// y = (top - (v . up) / z) sy,       sy = height / (top - bottom)         pixels from the top
+/// ```
+///
+/// and texels are pixels moved by the rectangle's corner; all rows are multiplied by z, which is w.
+pub(crate) fn projector(c: &Camera, offset: Vec3, slot: &Slot, atlas: LocalPayload) -> Projector {
+    let [x, y, w, h] = slot.rect.map(|v| v as f32);
+    let (sx, sy) = (w / (c.right_tan - c.left), h / (c.top - c.bottom));
+    let row_u = c.right * sx + c.forward * (x - c.left * sx);
+    let row_v = c.forward * (y + c.top * sy) - c.up * sy;
+    let row = |r: Vec3| r.extend(r.dot(offset));
+    let matrix = Mat4::from_cols(row(row_u), row(row_v), row(c.forward), row(c.forward)).transpose();
+    Projector { matrix, eye: -offset, atlas, layer: slot.layer, rect: slot.rect }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_projector_sends_a_point_to_the_texel_of_its_pixel(p in [-3f32..3.0, -3f32..3.0, -3f32..3.0]) {
+            let p = Vec3::from(p);
+            let eye = DVec3::new(20.0, 4.0, -11.0);
+            let corners = Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) }.corners();
+            let c = Camera::around(eye, -eye.as_vec3(), corners, 300.0, 2, 0.1).unwrap();
+            let slot = Slot { atlas: 0, layer: 3, rect: [100, 40, c.size[0], c.size[1]] };
+            let q = projector(&c, (-eye).as_vec3(), &slot, LocalPayload(9));
+            let (t, px) = (q.matrix * p.extend(1.0), c.project(p - eye.as_vec3()).unwrap());
+            prop_assert!((t.x / t.w - 100.0 - px.x).abs() < 0.01 && (t.y / t.w - 40.0 - px.y).abs() < 0.01);
+            prop_assert!((t.w - px.z).abs() < 1e-3 && (t.z - px.z).abs() < 1e-3);
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Original geometry, gathered: the far chunks of one object, welded into one mesh.
+//!
+//! Chunks name their vertices mesh-wide, so welding is exact and linear. Positions are kept relative to the piece's own middle (64-bit
+//! transforms, 32-bit offsets), so nothing depends on where in the scene it stands. A welded vertex has one shading normal and one
+//! albedo: at seams those of the chunk that names it first, which matters only where no picture shows the surface.
+
+use farfield_core::color::{byte_of_linear, linear_of_byte};
+use farfield_core::id::{ChunkId, ObjectId};
+use farfield_core::mesh::ChunkMesh;
+use farfield_core::scene::{ChunkSet, Material, Scene, Texture};
+use farfield_core::{Aabb, Fault};
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+
+/// Far chunks of one object that are simplified together.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Piece {
+    /// Whose.
+    pub(crate) object: ObjectId,
+    /// Which.
+    pub(crate) chunks: ChunkSet,
+    /// Their box, local frame.
+    pub(crate) bounds: Aabb,
+}
+
+/// A welded piece. Triangles are counter-clockwise seen from in front, whatever the object's transform.
+#[derive(Debug, Default)]
+pub(crate) struct Welded {
+    /// Where positions start from, local frame.
+    pub(crate) origin: DVec3,
+    /// Positions relative to the origin.
+    pub(crate) positions: Vec<Vec3>,
+    /// Area-weighted normals of the welded triangles: what bends are measured on.
+    pub(crate) normals: Vec<Vec3>,
+    /// Shading normals.
+    pub(crate) shading: Vec<Vec3>,
+    /// sRGB albedo.
+    pub(crate) albedo: Vec<[u8; 4]>,
+    /// Three vertices a triangle.
+    pub(crate) triangles: Vec<[u32; 3]>,
+    /// Whether a triangle is seen from behind too.
+    pub(crate) two_sided: Vec<bool>,
+    /// Whether a vertex belongs to a chunk of the object outside the piece as well: it may not move.
+    pub(crate) locked: Vec<bool>,
+}
+
+impl Welded {
+    /// Twice a triangle's area vector; zero where it has no area.
+    pub(crate) fn area_vector(&self, t: [u32; 3]) -> DVec3 {
+        let [a, b, c] = t.map(|v| self.positions[v as usize].as_dvec3());
+        (b - a).cross(c - a)
+    }
+
+    /// n . (eye - x) with n the area vector and x a corner: above 0 exactly where the triangle faces the eye (relative to the origin).
+    pub(crate) fn facing(&self, t: [u32; 3], eye: DVec3) -> f64 {
+        self.area_vector(t).dot(eye - self.positions[t[0] as usize].as_dvec3())
+    }
+}
+
+/// Welds a piece. O(vertices + triangles of the object).
+pub(crate) fn weld(scene: &Scene, piece: &Piece) -> Result<Welded, Fault> {
+    let object = &scene.objects[piece.object.index()];
+    let names = scene.meshes[object.mesh.index()].vertex_ids as usize;
+    let origin = piece.bounds.centre().as_dvec3();
+    let to_piece = DAffine3::from_translation(-origin) * object.placement;
+    let mirrored = object.placement.matrix3.determinant() < 0.0;
+    let turn = normal_matrix(&object.placement.matrix3);
+    let mut out = Welded { origin, ..Welded::default() };
+    let mut local = vec![u32::MAX; names];
+    for c in piece.chunks.iter() {
+        let placed = &scene.chunks[c.index()];
+        let material = scene.materials.get(scene.material_of(c).index()).cloned().unwrap_or_default();
+        let texture = material.texture.and_then(|t| scene.textures.get(t.index()));
+        scene.geometry.with(placed.source, &mut |chunk| {
+            for (i, &name) in chunk.vertex_ids.iter().enumerate() {
+                if local[name as usize] == u32::MAX {
+                    local[name as usize] = out.positions.len() as u32;
+                    out.positions.push(to_piece.transform_point3(chunk.positions[i].as_dvec3()).as_vec3());
+                    out.shading.push((turn * chunk.normals[i].as_dvec3()).normalize_or(DVec3::Y).as_vec3());
+                    out.albedo.push(albedo(chunk, i, &material, texture));
+                }
+            }
+            for t in chunk.indices.chunks_exact(3) {
+                let [a, b, c] = [0, 1, 2].map(|k| local[chunk.vertex_ids[t[k] as usize] as usize]);
+                out.triangles.push(if mirrored { [a, c, b] } else { [a, b, c] });
+                out.two_sided.push(material.two_sided);
+            }
+        })?;
+    }
+    out.locked = vec![false; out.positions.len()];
+    for c in object.chunks.clone().map(ChunkId).filter(|c| !piece.chunks.contains(*c)) {
+        scene.geometry.with(scene.chunks[c.index()].source, &mut |chunk| {
+            for &name in &chunk.vertex_ids {
+                if let Some(locked) = out.locked.get_mut(local[name as usize] as usize) {
+                    *locked = true;
+                }
+            }
+        })?;
+    }
+    let mut sums = vec![DVec3::ZERO; out.positions.len()];
+    for &t in &out.triangles {
+        let n = out.area_vector(t);
+        t.iter().for_each(|&v| sums[v as usize] += n);
+    }
+    out.normals = sums.iter().zip(&out.shading).map(|(n, s)| n.try_normalize().map_or(*s, |n| n.as_vec3())).collect();
+    Ok(out)
+}
+
+/// What turns normals: the cofactors, so that stretched objects keep normals at right angles; signed so that mirroring keeps
+/// them outside.
+fn normal_matrix(m: &DMat3) -> DMat3 {
+    let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+    if m.determinant() < 0.0 { cofactors * -1.0 } else { cofactors }
+}
+
+/// Base colour x texture x vertex colour in linear light, as sRGB.
+fn albedo(chunk: &ChunkMesh, i: usize, material: &Material, texture: Option<&Texture>) -> [u8; 4] {
+    let mut c = Vec3::new(material.base_color[0], material.base_color[1], material.base_color[2]);
+    if let Some(v) = chunk.colors.get(i) {
+        c *= linear(*v);
+    }
+    if let (Some(t), Some(&uv)) = (texture, chunk.uvs.get(i)) {
+        c *= sample(t, uv);
+    }
+    let [r, g, b] = c.to_array().map(byte_of_linear);
+    [r, g, b, 255]
+}
+
+fn linear(c: [u8; 4]) -> Vec3 {
+    Vec3::new(linear_of_byte(c[0]), linear_of_byte(c[1]), linear_of_byte(c[2]))
+}
+
+/// Bilinear, repeated outside 0..1.
+fn sample(t: &Texture, uv: Vec2) -> Vec3 {
+    let [w, h] = t.size;
+    if w == 0 || h == 0 || !uv.is_finite() {
+        return Vec3::ONE;
+    }
+    let at = Vec2::new(uv.x.rem_euclid(1.0) * w as f32, uv.y.rem_euclid(1.0) * h as f32) - 0.5;
+    let (base, f) = (at.floor(), at - at.floor());
+    let texel = |dx: i32, dy: i32| {
+        let (x, y) = ((base.x as i32 + dx).rem_euclid(w as i32), (base.y as i32 + dy).rem_euclid(h as i32));
+        linear(t.rgba[(y as u32 * w + x as u32) as usize])
+    };
+    let top = texel(0, 0).lerp(texel(1, 0), f.x);
+    top.lerp(texel(0, 1).lerp(texel(1, 1), f.x), f.y)
+}
