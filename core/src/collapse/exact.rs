@@ -7,7 +7,7 @@
 //! What limits it: memory latency. A collapse touches some 12 triangles, 14 vertices and 20 edges that lie where they lay in the
 //! input; in the heap, a price that falls below the current limit moves through about log4 of its length.
 
-use super::mesh::{LiveMesh, Marks};
+use super::mesh::{LiveMesh, others};
 use super::queue::Queue;
 use super::rules::Rules;
 use super::{BLOCK, Candidate, Collapsed, Cost, Reach, Settings, resolve};
@@ -18,9 +18,6 @@ struct Exact<'a, C: ?Sized> {
     queue: Queue,
     /// Edge k of a triangle joins its corners k and k + 1.
     edges_of: Vec<[u32; 3]>,
-    /// The edge between the vertex at hand and this one, where marked.
-    edge_to: Vec<u32>,
-    marks: Marks,
     /// Neighbours that the collapse at hand leaves without an edge to the survivor.
     left: Vec<u32>,
     prices: Prices,
@@ -81,24 +78,18 @@ impl<'a, C: Cost + ?Sized> Exact<'a, C> {
     fn new(mesh: LiveMesh, cost: &'a mut C, max_cost: f32) -> Self {
         let vertices = mesh.vertices();
         let mut edges_of = vec![[0; 3]; mesh.all_triangles()];
-        let mut ends = Vec::with_capacity(mesh.live_triangles() * 3 / 2 + 16);
-        let mut edge_to = vec![0; vertices];
-        let mut marks = Marks::new(vertices);
+        let mut queue = Queue::new(vertices, max_cost);
         for v in 0..vertices as u32 {
-            marks.clear();
+            queue.unmark();
             for &t in mesh.triangles_of(v) {
                 for (k, x) in spokes(mesh.corners(t), v) {
                     if x > v {
-                        if marks.insert(x) {
-                            edge_to[x as usize] = ends.len() as u32;
-                            ends.push([v, x]);
-                        }
-                        edges_of[t as usize][k] = edge_to[x as usize];
+                        let next = queue.len() as u32;
+                        edges_of[t as usize][k] = queue.mark(x, next).unwrap_or_else(|| queue.add([v, x]));
                     }
                 }
             }
         }
-        let mut queue = Queue::new(ends, vertices, max_cost);
         let mut prices = Prices::default();
         let all = queue.len() as u32;
         for first in (0..all).step_by(BLOCK) {
@@ -112,53 +103,48 @@ impl<'a, C: Cost + ?Sized> Exact<'a, C> {
                 queue.set(e, prices.ends[i], prices.out[i].cost);
             }
         }
-        Self { mesh, cost, queue, edges_of, edge_to, marks, left: Vec::new(), prices }
+        Self { mesh, cost, queue, edges_of, left: Vec::new(), prices }
     }
 
     /// Gives the edges of `from` over to `onto` before the mesh does so with the triangles: an edge to a common neighbour
     /// becomes the one that `onto` has already.
     fn merge_edges(&mut self, edge: u32, from: u32, onto: u32) {
-        let Self { mesh, queue, edges_of, edge_to, marks, left, .. } = self;
+        let Self { mesh, queue, edges_of, left, .. } = self;
         queue.remove(edge);
-        left.clear();
-        marks.clear();
+        queue.unmark();
         for &t in mesh.triangles_of(onto) {
             for (k, x) in spokes(mesh.corners(t), onto) {
-                marks.insert(x);
-                edge_to[x as usize] = edges_of[t as usize][k];
+                queue.mark(x, edges_of[t as usize][k]);
             }
         }
         for &t in mesh.triangles_of(from) {
             for (k, x) in spokes(mesh.corners(t), from) {
                 let e = &mut edges_of[t as usize][k];
-                if x == onto {
-                    continue;
-                }
-                if marks.insert(x) {
-                    edge_to[x as usize] = *e;
-                } else if edge_to[x as usize] != *e {
+                if x != onto
+                    && let Some(kept) = queue.mark(x, *e)
+                    && kept != *e
+                {
                     queue.remove(*e);
-                    *e = edge_to[x as usize];
+                    *e = kept;
                 }
             }
         }
-        // An edge that only the dying triangles have dies with them. Its third vertex is a common neighbour.
-        marks.clear();
-        for run in [mesh.triangles_of(onto), mesh.triangles_of(from)] {
-            for &t in run {
-                let corners = mesh.corners(t);
-                if !(corners.contains(&from) && corners.contains(&onto)) {
-                    corners.iter().for_each(|&x| _ = marks.insert(x));
-                }
-            }
-        }
+        // An edge that only dying triangles have dies with them.
+        left.clear();
         for &t in mesh.triangles_of(onto) {
             let corners = mesh.corners(t);
-            if let Some(&w) = corners.iter().find(|&&x| x != from && x != onto)
-                && corners.contains(&from)
-                && !marks.has(w)
-            {
-                queue.remove(edge_to[w as usize]);
+            if !corners.contains(&from) {
+                continue;
+            }
+            let [x, y] = others(corners, onto);
+            let w = x ^ y ^ from;
+            let keeps = |v, partner| {
+                mesh.triangles_of(v).iter().map(|&t| mesh.corners(t)).any(|c| c.contains(&w) && !c.contains(&partner))
+            };
+            if !keeps(onto, from) && !keeps(from, onto) {
+                if let Some(e) = queue.mark(w, edge) {
+                    queue.remove(e);
+                }
                 left.push(w);
             }
         }
@@ -166,13 +152,14 @@ impl<'a, C: Cost + ?Sized> Exact<'a, C> {
 
     /// Asks the costs of all edges that the collapse onto `v` may have changed, and lets held ones near it try again.
     fn reprice(&mut self, v: u32) {
-        let Self { mesh, cost, queue, edges_of, marks, left, prices, .. } = self;
+        let Self { mesh, cost, queue, edges_of, left, prices } = self;
         prices.clear();
-        marks.clear();
+        queue.unmark();
         for &t in mesh.triangles_of(v) {
             for (k, x) in spokes(mesh.corners(t), v) {
-                if marks.insert(x) {
-                    prices.push(edges_of[t as usize][k], v, x);
+                let e = edges_of[t as usize][k];
+                if queue.mark(x, e).is_none() {
+                    prices.push(e, v, x);
                 }
             }
         }

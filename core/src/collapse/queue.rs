@@ -26,6 +26,14 @@ struct Entry {
     edge: u32,
 }
 
+/// Scratch of a vertex, together because it is read together.
+#[derive(Clone, Copy)]
+struct Spot {
+    mark: u32,
+    edge: u32,
+    held: u32,
+}
+
 pub(super) struct Queue {
     edges: Vec<Edge>,
     heap: Vec<Entry>,
@@ -34,15 +42,27 @@ pub(super) struct Queue {
     /// What costs at most this is in the heap.
     limit: f32,
     max_cost: f32,
-    /// Number of held edges at each vertex.
-    held: Vec<u32>,
+    spots: Vec<Spot>,
+    mark: u32,
 }
 
 impl Queue {
-    /// Edges with their ends, not queued yet.
-    pub(super) fn new(ends: Vec<[u32; 2]>, vertices: usize, max_cost: f32) -> Self {
-        let edges = ends.into_iter().map(|ends| Edge { ends, cost: f32::INFINITY, slot: NOWHERE }).collect();
-        Self { edges, heap: Vec::new(), stock: Vec::new(), limit: f32::NEG_INFINITY, max_cost, held: vec![0; vertices] }
+    pub(super) fn new(vertices: usize, max_cost: f32) -> Self {
+        Self {
+            edges: Vec::new(),
+            heap: Vec::new(),
+            stock: Vec::new(),
+            limit: f32::NEG_INFINITY,
+            max_cost,
+            spots: vec![Spot { mark: 0, edge: 0, held: 0 }; vertices],
+            mark: 0,
+        }
+    }
+
+    /// A new edge, not queued yet.
+    pub(super) fn add(&mut self, ends: [u32; 2]) -> u32 {
+        self.edges.push(Edge { ends, cost: f32::INFINITY, slot: NOWHERE });
+        self.edges.len() as u32 - 1
     }
 
     pub(super) fn len(&self) -> usize {
@@ -57,7 +77,27 @@ impl Queue {
     /// Number of held edges at a vertex.
     #[inline]
     pub(super) fn held_at(&self, vertex: u32) -> u32 {
-        self.held[vertex as usize]
+        self.spots[vertex as usize].held
+    }
+
+    /// Forgets all marks.
+    pub(super) fn unmark(&mut self) {
+        if self.mark == u32::MAX {
+            self.spots.iter_mut().for_each(|s| s.mark = 0);
+            self.mark = 0;
+        }
+        self.mark += 1;
+    }
+
+    /// Marks a vertex with an edge; the one that it is marked with already, if it is, stays and is returned.
+    #[inline]
+    pub(super) fn mark(&mut self, vertex: u32, edge: u32) -> Option<u32> {
+        let spot = &mut self.spots[vertex as usize];
+        if spot.mark == self.mark {
+            return Some(spot.edge);
+        }
+        (spot.mark, spot.edge) = (self.mark, edge);
+        None
     }
 
     /// Puts an edge in, or changes what it costs and joins. Forbidden and too dear ones are taken out.
@@ -66,7 +106,7 @@ impl Queue {
         let (slot, old_ends) = (e.slot, e.ends);
         (e.ends, e.cost) = (ends, cost);
         if slot == HELD {
-            old_ends.iter().for_each(|&v| self.held[v as usize] -= 1);
+            old_ends.iter().for_each(|&v| self.spots[v as usize].held -= 1);
         }
         // f32::MAX stands for "no limit", infinity for "forbidden"; NaN is neither below nor above.
         let wanted = cost <= self.max_cost && cost < f32::INFINITY;
@@ -99,7 +139,7 @@ impl Queue {
     pub(super) fn hold(&mut self, edge: u32) {
         let e = &mut self.edges[edge as usize];
         e.slot = HELD;
-        e.ends.iter().for_each(|&v| self.held[v as usize] += 1);
+        e.ends.iter().for_each(|&v| self.spots[v as usize].held += 1);
     }
 
     /// Puts a held edge back at its old cost; others stay as they are.
