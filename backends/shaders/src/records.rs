@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use farfield_core::Fault;
 use farfield_core::id::{ChunkId, MeshChunkId, TextureId};
 use farfield_core::scene::{Object, Scene};
 use glam::{DMat3, DVec3};
@@ -130,6 +131,31 @@ impl ObjectRow {
             mirrored: m.determinant() < 0.0,
         }
     }
+}
+
+/// Checks that a scene's textures are sound, no wider or higher than `max_px`, and that materials name only textures that there
+/// are.
+///
+/// # Errors
+/// [`Fault::Data`] naming the texture or material.
+pub fn check_textures(scene: &Scene, max_px: u32) -> Result<(), Fault> {
+    let bad = |place: String, cause: String| Err(Fault::Data { place, cause });
+    for t in &scene.textures {
+        let [w, h] = t.size;
+        let place = format!("texture \"{}\"", t.name);
+        if w == 0 || h == 0 || t.rgba.len() != w as usize * h as usize {
+            return bad(place, format!("{} texels for {w} x {h}", t.rgba.len()));
+        }
+        if w > max_px || h > max_px {
+            return bad(place, format!("{w} x {h} texels; this device takes {max_px} x {max_px}"));
+        }
+    }
+    for m in &scene.materials {
+        if let Some(t) = m.texture.filter(|t| t.index() >= scene.textures.len()) {
+            return bad(format!("material \"{}\"", m.name), format!("texture {} of {}", t.0, scene.textures.len()));
+        }
+    }
+    Ok(())
 }
 
 /// The record of a payload part: nothing is turned, its origin stands where it stands.
