@@ -330,3 +330,33 @@ fn a_hit_farther_than_numbers_go_is_none() {
     let ray = Ray::new(DVec3::ZERO, Vec3::X, 0.0, f32::INFINITY).unwrap();
     assert_eq!(bvh.closest_hit(&ray, |_| true).unwrap().t, x);
 }
+
+/// Rays that run exactly along the planes of edges and through vertices: the edge functions are 0, not merely small.
+#[test]
+fn rays_exactly_through_edges_and_vertices_hit() {
+    let mut positions = vec![];
+    for i in 0..49u16 {
+        positions.push(Vec3::new(f32::from(i % 7), f32::from(i / 7), f32::from(i * 37 % 11) * 0.03));
+    }
+    let mut indices = vec![];
+    for j in 0..6u32 {
+        for i in 0..6u32 {
+            let a = 7 * j + i;
+            indices.extend([a, a + 1, a + 8, a, a + 8, a + 7]);
+        }
+    }
+    let bvh = TriangleBvh::build(&positions, &indices);
+    for j in 2..=22 {
+        for i in 2..=22 {
+            // Steps of a quarter: vertices, edges along x and y, diagonals and insides.
+            let eye = DVec3::new(f64::from(i) * 0.25, f64::from(j) * 0.25, 5.0);
+            let down = Ray::new(eye, -Vec3::Z, 0.0, f32::INFINITY).unwrap();
+            assert!(bvh.closest_hit(&down, |h| h.front).is_some(), "a pinhole under {eye}");
+            for d in [Vec3::new(0.25, 0.0, -1.0), Vec3::new(0.0, -0.25, -1.0), Vec3::new(0.25, 0.25, -1.0)] {
+                let from = DVec3::new(eye.x - 5.0 * f64::from(d.x), eye.y - 5.0 * f64::from(d.y), 5.0);
+                let slanting = Ray::new(from, d, 0.0, f32::INFINITY).unwrap();
+                assert!(bvh.closest_hit(&slanting, |_| true).is_some(), "a pinhole from {from} along {d}");
+            }
+        }
+    }
+}

@@ -62,14 +62,26 @@ enum Binary {
     Inner(Box<[Binary; 2]>),
 }
 
+/// A binary tree with boxes and with runs of items.
+struct Fitted {
+    bounds: Aabb,
+    items: Range<u32>,
+    children: Option<Box<[Fitted; 2]>>,
+}
+
 impl Binary {
-    /// The same tree with its runs' ends looked up.
-    fn map(self, ends: &[u32]) -> Self {
+    /// The tree with boxes around its items; `ends` says where each of its runs ends in `order`.
+    fn fit(self, ends: &[u32], order: &[u32], boxes: &[Aabb]) -> Fitted {
         match self {
-            Self::Leaf(r) => Self::Leaf(ends[r.start as usize]..ends[r.end as usize]),
+            Self::Leaf(r) => {
+                let items = ends[r.start as usize]..ends[r.end as usize];
+                let run = &order[items.start as usize..items.end as usize];
+                let bounds = run.iter().fold(Aabb::EMPTY, |a, &i| a.union(boxes[i as usize]));
+                Fitted { bounds, items, children: None }
+            }
             Self::Inner(c) => {
-                let [a, b] = *c;
-                Self::Inner(Box::new([a.map(ends), b.map(ends)]))
+                let c = c.map(|x| x.fit(ends, order, boxes));
+                Fitted { bounds: c[0].bounds.union(c[1].bounds), items: 0..0, children: Some(Box::new(c)) }
             }
         }
     }
@@ -115,46 +127,37 @@ impl Tree {
             items.extend_from_slice(&order[starts[g as usize] as usize..end]);
             ends.push(items.len() as u32);
         }
+        let fitted = binary.fit(&ends, &items, boxes);
         let mut tree = Self { nodes: vec![], order: items, bounds: Some(bounds) };
-        tree.widen(&binary.map(&ends), boxes);
+        tree.widen(&fitted);
         tree
     }
 
-    fn bounds_of(&self, b: &Binary, boxes: &[Aabb]) -> Aabb {
-        match b {
-            Binary::Leaf(r) => self.order[r.start as usize..r.end as usize]
-                .iter()
-                .fold(Aabb::EMPTY, |a, &i| a.union(boxes[i as usize])),
-            Binary::Inner(c) => self.bounds_of(&c[0], boxes).union(self.bounds_of(&c[1], boxes)),
-        }
-    }
-
-    /// Writes `b` as one node over up to four of its descendants, the ones with the largest boxes opened first.
-    fn widen(&mut self, b: &Binary, boxes: &[Aabb]) -> u32 {
-        let mut open: Vec<(&Binary, Aabb)> = vec![(b, self.bounds_of(b, boxes))];
+    /// Writes a node over up to four descendants of `f`, the ones with the largest boxes opened first.
+    fn widen(&mut self, f: &Fitted) -> u32 {
+        let area = |f: &Fitted| {
+            let s = f.bounds.size().as_dvec3();
+            s.x * s.y + s.y * s.z + s.z * s.x
+        };
+        let mut open = vec![f];
         while open.len() < 4 {
-            let area = |a: &Aabb| {
-                let s = a.size().as_dvec3();
-                s.x * s.y + s.y * s.z + s.z * s.x
-            };
-            let widest = (0..open.len())
-                .filter(|&i| matches!(open[i].0, Binary::Inner(_)))
-                .max_by(|&i, &j| area(&open[i].1).total_cmp(&area(&open[j].1)));
-            let Some(Binary::Inner(c)) = widest.map(|i| open.remove(i).0) else { break };
-            open.extend(c.iter().map(|x| (x, self.bounds_of(x, boxes))));
+            let inner = (0..open.len()).filter(|&i| open[i].children.is_some());
+            let widest = inner.max_by(|&i, &j| area(open[i]).total_cmp(&area(open[j])));
+            let Some(children) = widest.and_then(|i| open.remove(i).children.as_deref()) else { break };
+            open.extend(children);
         }
         let at = self.nodes.len();
         let empty = [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]];
         self.nodes.push(Node { planes: empty, first: [0; 4], count: [0; 4] });
-        for (i, (child, bounds)) in open.into_iter().enumerate() {
-            let (first, count) = match child {
-                Binary::Leaf(r) => (r.start, r.end - r.start),
-                inner => (self.widen(inner, boxes), 0),
+        for (i, child) in open.into_iter().enumerate() {
+            let (first, count) = match child.children {
+                None => (child.items.start, child.items.end - child.items.start),
+                Some(_) => (self.widen(child), 0),
             };
             let node = &mut self.nodes[at];
             for axis in 0..3 {
-                node.planes[0][axis][i] = bounds.min[axis];
-                node.planes[1][axis][i] = bounds.max[axis];
+                node.planes[0][axis][i] = child.bounds.min[axis];
+                node.planes[1][axis][i] = child.bounds.max[axis];
             }
             (node.first[i], node.count[i]) = (first, count);
         }
@@ -320,4 +323,47 @@ fn balanced(items: &mut [u32], start: u32, of: &impl Fn(u32) -> Aabb, leaf: usiz
     let (low, high) = items.split_at_mut(items.len() / 2);
     let middle = start + low.len() as u32;
     Binary::Inner(Box::new([balanced(low, start, of, leaf), balanced(high, middle, of, leaf)]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The way out where clustering goes too deep.
+    #[test]
+    fn a_balanced_tree_holds_every_item_once_and_is_shallow() {
+        let boxes: Vec<Aabb> =
+            (0..1000).map(|i| Aabb::of([Vec3::new((i % 7) as f32, (i / 500) as f32, 0.0)])).collect();
+        let mut items: Vec<u32> = (0..1000).collect();
+        let tree = balanced(&mut items, 0, &|i| boxes[i as usize], 6);
+        fn runs(b: &Binary, depth: usize, out: &mut Vec<(Range<u32>, usize)>) {
+            match b {
+                Binary::Leaf(r) => out.push((r.clone(), depth)),
+                Binary::Inner(c) => c.iter().for_each(|c| runs(c, depth + 1, out)),
+            }
+        }
+        let mut leaves = vec![];
+        runs(&tree, 0, &mut leaves);
+        assert!(leaves.iter().all(|(r, depth)| r.len() <= 6 && *depth <= 8));
+        assert_eq!(leaves.iter().flat_map(|(r, _)| r.clone()).collect::<Vec<_>>(), (0..1000).collect::<Vec<_>>());
+        items.sort_unstable();
+        assert_eq!(items, (0..1000).collect::<Vec<_>>());
+    }
+
+    /// What clusters into a chain deeper than the limit is built balanced instead.
+    #[test]
+    fn no_tree_is_deeper_than_the_stack() {
+        let boxes: Vec<Aabb> = (0..100).map(|k| Aabb::of([Vec3::ZERO, Vec3::splat(0.8f32.powi(k))])).collect();
+        let tree = Tree::build(&boxes, 1);
+        let mut depth = vec![0usize; tree.nodes.len()];
+        for (i, n) in tree.nodes.iter().enumerate() {
+            for k in (0..4).filter(|&k| n.count[k] == 0 && n.planes[0][0][k] <= n.planes[1][0][k]) {
+                depth[n.first[k] as usize] = depth[i] + 1;
+            }
+        }
+        assert!(depth.into_iter().all(|d| d <= MAX_DEPTH));
+        let mut seen = tree.order.clone();
+        seen.sort_unstable();
+        assert_eq!(seen, (0..100).collect::<Vec<_>>());
+    }
 }
