@@ -1,1 +1,91 @@
 //! Every strategy, registered by name.
+//!
+//! Strategies make themselves known to serde through `typetag`; this list says beside it, explicitly and in alphabetical order, what
+//! there is, with summaries, sources and settings, for `list`, for the book and for finding mistakes in experiment files. A
+//! test holds the two equal.
+
+use farfield_core::registry::{Entry, Kind, settings_of};
+
+pub use {
+    farfield_far_baselines as far_baselines, farfield_far_textured_mesh as far_textured_mesh,
+    farfield_metrics as metrics, farfield_partition_hex as partition_hex,
+    farfield_partition_single_cell as partition_single_cell, farfield_schedulers as schedulers,
+};
+
+/// The paper of the textured LOD meshes, before a section's number.
+macro_rules! textured {
+    ($section:literal) => {
+        concat!("Textured LOD meshes (Chen, Lin, Chen, Chuang 2003), section ", $section)
+    };
+}
+
+/// Every strategy, by kind, then by name.
+pub fn registry() -> Vec<Entry> {
+    vec![
+        Entry {
+            kind: Kind::FarField,
+            name: "geometry",
+            summary: "No far field: all geometry, or what frustum culling leaves of it",
+            source: textured!("4, configurations A and B"),
+            settings: settings_of::<far_baselines::AllGeometry>(),
+        },
+        Entry {
+            kind: Kind::FarField,
+            name: "textured-lod-mesh",
+            summary: "Distant objects as small meshes that wear pictures of themselves",
+            source: textured!("3.1.2-3.1.5 and 3.2"),
+            settings: settings_of::<far_textured_mesh::TexturedLodMesh>(),
+        },
+        Entry {
+            kind: Kind::Partition,
+            name: "hex-cells",
+            summary: "Hexagonal cells of viewpoints on the ground plane, six windows each",
+            source: textured!("3.1.1"),
+            settings: settings_of::<partition_hex::HexCells>(),
+        },
+        Entry {
+            kind: Kind::Partition,
+            name: "single-cell",
+            summary: "One cell for every viewpoint, or for a box of them",
+            source: "farfield",
+            settings: settings_of::<partition_single_cell::SingleCell>(),
+        },
+        Entry {
+            kind: Kind::Scheduler,
+            name: "load-on-entry",
+            summary: "Fetches what the active cell wants when it is entered, frees the rest",
+            source: "farfield; the baseline without prefetching",
+            settings: settings_of::<schedulers::LoadOnEntry>(),
+        },
+        Entry {
+            kind: Kind::SimplificationMetric,
+            name: "quadric",
+            summary: "How far a collapse moves the surface, in pixels",
+            source: "Surface simplification using quadric error metrics (Garland, Heckbert 1997), sections 5 and 6",
+            settings: settings_of::<metrics::Quadric>(),
+        },
+        Entry {
+            kind: Kind::SimplificationMetric,
+            name: "silhouette-weighted",
+            summary: "Bend, projected length and importance on depth images",
+            source: textured!("3.1.3.3"),
+            settings: settings_of::<metrics::SilhouetteWeighted>(),
+        },
+        Entry {
+            kind: Kind::VisibilityMetric,
+            name: "self-occlusion",
+            summary: "How far a viewer can look behind an object's own silhouette, in pixels",
+            source: textured!("3.1.2"),
+            settings: settings_of::<metrics::SelfOcclusion>(),
+        },
+    ]
+}
+
+/// Keeps the strategies' self-registration in the program. A library that nothing names may be left out by the linker; a
+/// program that reads strategies by name calls this once.
+pub fn link() -> usize {
+    registry().len()
+}
+
+#[cfg(test)]
+mod tests;
