@@ -266,8 +266,9 @@ fn push_draw(
                 let chunk = table.chunk(id, camera.eye).ok_or_else(|| {
                     Fault::Refused(format!("a draw names placed chunk {} of {}", id.0, table.chunks().end))
                 })?;
-                let slot = residency.chunk(chunk.source).ok_or_else(|| missing(Block::Chunk(chunk.source)))?;
-                let bind = Bind::Texture(chunk.texture);
+                let (slot, has_uvs) =
+                    residency.chunk(chunk.source).ok_or_else(|| missing(Block::Chunk(chunk.source)))?;
+                let bind = Bind::Texture(chunk.texture.filter(|_| has_uvs));
                 let key = key(Shader::Chunk, chunk.cull, slot, bind);
                 out.near_triangles += u64::from(slot.indices.len / 3);
                 batches.push(key, slot, out.records.len() as u32);

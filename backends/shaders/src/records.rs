@@ -17,10 +17,8 @@ use crate::layout::Record;
 pub enum Cull {
     /// None: two-sided.
     None,
-    /// Those whose stored order is clockwise as seen.
+    /// Those whose corners run clockwise as seen, after placement: one that mirrors turns front faces into back faces.
     Back,
-    /// Those whose stored order is counter-clockwise as seen: a placement that mirrors turns the order around.
-    BackMirrored,
 }
 
 /// What a backend keeps of a scene: enough to make draw records.
@@ -43,7 +41,6 @@ struct ObjectRow {
     linear: [[f32; 3]; 3],
     translation: DVec3,
     normal: [[f32; 4]; 3],
-    mirrored: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -107,11 +104,7 @@ impl SceneTable {
             first_projector: 0,
             unused: 0,
         };
-        let cull = match (material.two_sided, object.mirrored) {
-            (true, _) => Cull::None,
-            (false, false) => Cull::Back,
-            (false, true) => Cull::BackMirrored,
-        };
+        let cull = if material.two_sided { Cull::None } else { Cull::Back };
         Some(ChunkDraw { source: row.source, record, texture: material.texture, cull })
     }
 }
@@ -128,7 +121,6 @@ impl ObjectRow {
             linear: rows(m),
             translation: o.placement.translation,
             normal: rows(normal).map(|[x, y, z]| [x, y, z, 0.0]),
-            mirrored: m.determinant() < 0.0,
         }
     }
 }

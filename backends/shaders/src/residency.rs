@@ -76,7 +76,8 @@ pub struct Placement {
 #[derive(Debug)]
 pub struct Residency {
     pools: [Pool; 5],
-    chunks: HashMap<MeshChunkId, Slot>,
+    /// With whether there are texture coordinates.
+    chunks: HashMap<MeshChunkId, (Slot, bool)>,
     payloads: HashMap<PayloadRef, PayloadSlot>,
 }
 
@@ -124,7 +125,7 @@ impl Residency {
                     &c.indices,
                     out,
                 )?;
-                self.chunks.insert(id, slot);
+                self.chunks.insert(id, (slot, !c.uvs.is_empty()));
             }
             (Block::Payload(id), BlockData::Payload(p)) => {
                 let slot = self.payload(block, p, out)?;
@@ -236,7 +237,7 @@ impl Residency {
     pub fn release(&mut self, block: Block) -> bool {
         match block {
             Block::Chunk(id) => {
-                self.chunks.remove(&id).map(|slot| self.give_slot(Stream::ChunkVertices, slot)).is_some()
+                self.chunks.remove(&id).map(|(slot, _)| self.give_slot(Stream::ChunkVertices, slot)).is_some()
             }
             Block::Payload(id) => self.payloads.remove(&id).map(|p| self.give_back(&p)).is_some(),
         }
@@ -260,8 +261,8 @@ impl Residency {
         self.pools[Stream::Indices as usize].give(slot.indices);
     }
 
-    /// Where a chunk lies, if it is there.
-    pub fn chunk(&self, id: MeshChunkId) -> Option<Slot> {
+    /// Where a chunk lies, if it is there, and whether it has texture coordinates.
+    pub fn chunk(&self, id: MeshChunkId) -> Option<(Slot, bool)> {
         self.chunks.get(&id).copied()
     }
 

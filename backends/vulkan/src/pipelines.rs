@@ -43,8 +43,7 @@ impl Pipelines {
             all.layouts.insert(shader, layout);
             let vertex = Module::new(gpu, shader, Stage::Vertex)?;
             let fragment = Module::new(gpu, shader, Stage::Fragment)?;
-            let ways: &[Cull] =
-                if shader == Shader::Shade { &[Cull::None] } else { &[Cull::None, Cull::Back, Cull::BackMirrored] };
+            let ways: &[Cull] = if shader == Shader::Shade { &[Cull::None] } else { &[Cull::None, Cull::Back] };
             for &cull in ways {
                 let pipeline = pipeline(gpu, shader, cull, layout, &vertex, &fragment)?;
                 all.made.insert((shader, cull), pipeline);
@@ -139,7 +138,6 @@ fn pipeline(
         .cull_mode(match cull {
             Cull::None => vk::CullModeFlags::NONE,
             Cull::Back => vk::CullModeFlags::BACK,
-            Cull::BackMirrored => vk::CullModeFlags::FRONT,
         })
         .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
         .line_width(1.0);

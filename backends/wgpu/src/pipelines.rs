@@ -88,7 +88,7 @@ impl Pipelines {
             [(Shader::Chunk, Some(&texture)), (Shader::Mesh, None), (Shader::Projected, Some(&atlases))]
         {
             let groups: Vec<_> = std::iter::once(Some(&view)).chain(group_1.map(Some)).collect();
-            for cull in [Cull::None, Cull::Back, Cull::BackMirrored] {
+            for cull in [Cull::None, Cull::Back] {
                 surfaces.push(((shader, cull), pipeline(device, shader, cull, &groups, &PLANES)));
             }
         }
@@ -158,8 +158,7 @@ fn pipeline(
             buffers: if draws { &buffers } else { &[] },
         },
         primitive: wgpu::PrimitiveState {
-            front_face: if cull == Cull::BackMirrored { wgpu::FrontFace::Cw } else { wgpu::FrontFace::Ccw },
-            cull_mode: (cull != Cull::None).then_some(wgpu::Face::Back),
+            cull_mode: (cull == Cull::Back).then_some(wgpu::Face::Back),
             ..Default::default()
         },
         depth_stencil: draws.then_some(depth),
