@@ -27,6 +27,11 @@ pub trait Partition: Send + Sync + Debug {
     /// # Errors
     /// [`Fault::Refused`] where the settings do not fit the scene or the views.
     fn divide(&self, scene: &Scene, views: &ViewModel, cx: &Context<'_>) -> Result<Box<dyn Cells>, Fault>;
+
+    /// Raised whenever the same settings give other cells: part of every store key. By default 1.
+    fn version(&self) -> u32 {
+        1
+    }
 }
 
 /// Divided viewpoints. Three methods required.
@@ -152,6 +157,11 @@ pub trait FarField: Send + Sync + Debug {
     /// As [`FarField::bake_cell`].
     fn bake_scene(&self, _job: &SceneJob<'_>, _out: &dyn Sink, _cx: &Context<'_>) -> Result<Vec<u8>, Fault> {
         Ok(vec![])
+    }
+
+    /// Raised whenever the same job gives other bytes: part of every store key. By default 1.
+    fn version(&self) -> u32 {
+        1
     }
 }
 
