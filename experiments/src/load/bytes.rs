@@ -11,7 +11,12 @@ pub(super) const MAX_UNPACKED_BYTES: u64 = 2 << 30;
 
 /// The bytes of a file, unpacked if it is gzipped.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
-    let raw = std::fs::read(path).map_err(|cause| LoadError::Read { file: path.to_owned(), cause })?;
+    let failed = |cause| LoadError::Read { file: path.to_owned(), cause };
+    // Devices and pipes may never end.
+    if !std::fs::metadata(path).map_err(failed)?.is_file() {
+        return Err(failed(std::io::Error::other("it is not a plain file")));
+    }
+    let raw = std::fs::read(path).map_err(failed)?;
     if !raw.starts_with(&[0x1f, 0x8b]) {
         return Ok(raw);
     }

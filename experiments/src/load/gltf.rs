@@ -9,31 +9,28 @@ use std::path::Path;
 
 use farfield_core::color::byte_of_linear;
 use farfield_core::scene::Material;
+use glam::{DAffine3, DMat4, DQuat, DVec3, Vec2, Vec3};
 use gltf::json::material::AlphaMode;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::texture::Info;
 use gltf::json::validation::{Checked, Validate};
 use gltf::json::{Index, Node, Root};
-use glam::{DAffine3, DMat4, DQuat, DVec3, Vec2, Vec3};
 
 use super::gltf_accessor::{Document, uri_bytes};
 use super::part::{Model, Part};
 use super::texture::Textures;
 use super::{LoadError, bytes};
 
-const EXTENSIONS: [&str; 4] = [
-    "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_unlit",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
-];
+const EXTENSIONS: [&str; 4] =
+    ["KHR_materials_pbrSpecularGlossiness", "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_texture_transform"];
 
 pub(super) fn read(path: &Path, data: &[u8]) -> Result<Model, LoadError> {
     let (json, bin) = if data.starts_with(b"glTF") { chunks(path, data)? } else { (data, None) };
     let mut root: Root = serde_json::from_slice(json)
         .map_err(|e| LoadError::data(path, format!("line {}, column {}", e.line(), e.column()), e.to_string()))?;
     if let Some(e) = root.extensions_required.iter().find(|e| !EXTENSIONS.contains(&e.as_str())) {
-        let cause = format!("{} is required and not supported; supported are {}", bytes::excerpt(e, 80), EXTENSIONS.join(", "));
+        let cause =
+            format!("{} is required and not supported; supported are {}", bytes::excerpt(e, 80), EXTENSIONS.join(", "));
         return Err(LoadError::unsupported(path, "extensionsRequired", cause));
     }
     root.extensions_required.clear();
@@ -56,10 +53,14 @@ pub(super) fn read(path: &Path, data: &[u8]) -> Result<Model, LoadError> {
         let m = material(&doc, i, &mut textures, &mut model.warnings);
         model.materials.push(m);
     }
-    model.materials.push(Material { base_color: [1.0; 4], ..Default::default() });
+    if root.meshes.iter().flat_map(|m| &m.primitives).any(|p| p.material.is_none()) {
+        // Section 3.7.2.2: a primitive without a material is white.
+        model.materials.push(Material { base_color: [1.0; 4], ..Default::default() });
+    }
     model.textures = textures.finish();
+    let mut indices_read = 0;
     for i in 0..root.meshes.len() {
-        let part = mesh(&doc, i, &mut model.warnings)?;
+        let part = mesh(&doc, i, &mut model.warnings, &mut indices_read)?;
         model.parts.push(part);
     }
     model.placements = nodes(path, &root, &mut model.warnings)?;
@@ -77,15 +78,17 @@ fn chunks<'a>(path: &Path, data: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>
     let bad = |place: &str, cause: String| LoadError::data(path, place, cause);
     match (word(4), word(8)) {
         (Some(2), Some(n)) if n as usize <= data.len() => {}
-        (Some(2), Some(n)) => return Err(bad("GLB header", format!("announces {n} bytes; the file has {}", data.len()))),
+        (Some(2), Some(n)) => {
+            return Err(bad("GLB header", format!("announces {n} bytes; the file has {}", data.len())));
+        }
         (Some(v), Some(_)) => return Err(bad("GLB header", format!("version {v}, not 2"))),
         _ => return Err(bad("GLB header", "the file ends in it".into())),
     }
     let (mut json, mut bin, mut at) = (None, None, 12);
     while let (Some(n), Some(kind)) = (word(at), word(at + 4)) {
-        let chunk = data.get(at + 8..at + 8 + n as usize).ok_or_else(|| {
-            bad("GLB chunk", format!("{n} bytes at byte {} of a file of {}", at + 8, data.len()))
-        })?;
+        let chunk = data
+            .get(at + 8..at + 8 + n as usize)
+            .ok_or_else(|| bad("GLB chunk", format!("{n} bytes at byte {} of a file of {}", at + 8, data.len())))?;
         match &kind.to_le_bytes() {
             b"JSON" => json = json.or(Some(chunk)),
             b"BIN\0" => bin = bin.or(Some(chunk)),
@@ -181,12 +184,12 @@ fn material(doc: &Document, i: usize, textures: &mut Textures, warnings: &mut Ve
 }
 
 /// All triangles of a mesh.
-fn mesh(doc: &Document, i: usize, warnings: &mut Vec<String>) -> Result<Part, LoadError> {
+fn mesh(doc: &Document, i: usize, warnings: &mut Vec<String>, indices_read: &mut u64) -> Result<Part, LoadError> {
     let m = &doc.root.meshes[i];
     let name = m.name.clone().unwrap_or_else(|| format!("mesh {i}"));
     let mut part = Part { name, place: "triangle", ..Default::default() };
     for (k, p) in m.primitives.iter().enumerate() {
-        primitive(doc, p, &format!("meshes[{i}].primitives[{k}]"), &mut part, warnings)?;
+        primitive(doc, p, &format!("meshes[{i}].primitives[{k}]"), &mut part, warnings, indices_read)?;
     }
     Ok(part)
 }
@@ -197,6 +200,7 @@ fn primitive(
     place: &str,
     part: &mut Part,
     warnings: &mut Vec<String>,
+    indices_read: &mut u64,
 ) -> Result<(), LoadError> {
     let bad = |cause: String| LoadError::data(doc.path, place, cause);
     let find = |s: Semantic| p.attributes.get(&Checked::Valid(s)).copied();
@@ -209,7 +213,7 @@ fn primitive(
     };
     let positions = doc.numbers::<3>(positions, 0.0)?;
     let n = positions.len();
-    let indices = match p.indices {
+    let mut indices = match p.indices {
         Some(id) => doc.indices(id)?,
         None => (0..n as u32).collect(),
     };
@@ -238,27 +242,43 @@ fn primitive(
         }
     }
 
+    // An index takes a byte at least; accessors may be shared, but not so often that a small file fills the memory.
+    let most = 16 * doc.held().max(1 << 16);
+    *indices_read += indices.len() as u64;
+    if *indices_read > most {
+        return Err(bad(format!("primitives share their indices too often: more than {most} in all")));
+    }
+    // Primitives may share vertices: each takes those that it uses.
+    let (mut new, mut used) = (vec![u32::MAX; n], vec![]);
+    for v in &mut indices {
+        let id = &mut new[*v as usize];
+        if *id == u32::MAX {
+            *id = used.len() as u32;
+            used.push(*v as usize);
+        }
+        *v = *id;
+    }
     let first = part.positions.len() as u32;
-    if u64::from(first) + n as u64 > u64::from(u32::MAX) {
+    if u64::from(first) + used.len() as u64 > u64::from(u32::MAX) {
         return Err(bad("the mesh has more than 2^32 vertices".into()));
     }
-    part.positions.extend(positions.iter().map(|p| DVec3::from(p.map(f64::from))));
+    part.positions.extend(used.iter().map(|&v| DVec3::from(positions[v].map(f64::from))));
     let all = part.positions.len();
     // Attributes that only some primitives have: the others get none, (0, 0) and white.
     if normals.is_some() || !part.normals.is_empty() {
         part.normals.resize(first as usize, Vec3::ZERO);
-        part.normals.extend(normals.into_iter().flatten().map(Vec3::from));
+        part.normals.extend(normals.iter().flat_map(|l| used.iter().map(|&v| Vec3::from(l[v]))));
         part.normals.resize(all, Vec3::ZERO);
     }
     if uvs.is_some() || !part.uvs.is_empty() {
         let placed = placement(info);
         part.uvs.resize(first as usize, Vec2::ZERO);
-        part.uvs.extend(uvs.into_iter().flatten().map(|uv| placed(Vec2::from(uv))));
+        part.uvs.extend(uvs.iter().flat_map(|l| used.iter().map(|&v| placed(Vec2::from(l[v])))));
         part.uvs.resize(all, Vec2::ZERO);
     }
     if colors.is_some() || !part.colors.is_empty() {
         part.colors.resize(first as usize, [255; 4]);
-        part.colors.extend(colors.into_iter().flatten().map(|[r, g, b, _]| {
+        part.colors.extend(colors.iter().flat_map(|l| used.iter().map(|&v| l[v])).map(|[r, g, b, _]| {
             let [r, g, b] = [r, g, b].map(|v| if v.is_finite() { byte_of_linear(v) } else { 255 });
             [r, g, b, 255]
         }));

@@ -3,6 +3,8 @@
 //! Follows glTF 2.0 sections 3.6 (buffers, accessors, sparse accessors) and 3.6.2.2 (integers, normalised or not: so
 //! KHR_mesh_quantization needs nothing more). O(n).
 
+use std::borrow::Cow;
+use std::cell::Cell;
 use std::path::Path;
 
 use base64::Engine;
@@ -16,8 +18,13 @@ use super::{LoadError, bytes, mtl};
 pub(super) struct Document<'a> {
     pub(super) path: &'a Path,
     pub(super) root: &'a Root,
-    buffers: Vec<std::borrow::Cow<'a, [u8]>>,
+    buffers: Vec<Cow<'a, [u8]>>,
+    /// Items that may still be read: accessors are shared, so that a small file could ask for the same bytes for ever.
+    left: Cell<u64>,
 }
+
+/// How often, on average, each byte may be read as an item.
+const MAX_READS: u64 = 1024;
 
 impl<'a> Document<'a> {
     /// Reads every buffer: the GLB's own, data URIs and files beside the document.
@@ -25,7 +32,7 @@ impl<'a> Document<'a> {
         let mut buffers = vec![];
         for (i, b) in root.buffers.iter().enumerate() {
             let bad = |cause: String| LoadError::data(path, format!("buffer {i}"), cause);
-            let data = match &b.uri {
+            let data: Cow<[u8]> = match &b.uri {
                 Some(uri) => uri_bytes(path, uri).map_err(bad)?.into(),
                 None => match bin.filter(|_| i == 0) {
                     Some(bin) => bin.into(),
@@ -37,7 +44,15 @@ impl<'a> Document<'a> {
             }
             buffers.push(data);
         }
-        Ok(Self { path, root, buffers })
+        let left = Cell::new(0);
+        let doc = Self { path, root, buffers, left };
+        doc.left.set(MAX_READS * doc.held().max(1 << 16));
+        Ok(doc)
+    }
+
+    /// The bytes of all buffers.
+    pub(super) fn held(&self) -> u64 {
+        self.buffers.iter().map(|b| b.len() as u64).sum()
     }
 
     /// The bytes of a buffer view.
@@ -60,7 +75,10 @@ impl<'a> Document<'a> {
         let end = count.saturating_sub(1).checked_mul(stride as u64).and_then(|n| n.checked_add(size as u64));
         let end = end.and_then(|n| n.checked_add(offset));
         if stride < size || count > 0 && end.is_none_or(|n| n > view.len() as u64) {
-            let cause = format!("{count} items of {size} bytes, {stride} apart, from byte {offset} on do not fit in {} bytes", view.len());
+            let cause = format!(
+                "{count} items of {size} bytes, {stride} apart, from byte {offset} on do not fit in {} bytes",
+                view.len()
+            );
             return Err(LoadError::data(self.path, format!("bufferView {}", id.value()), cause));
         }
         Ok(Items { data: &view[offset.min(view.len() as u64) as usize..], size, stride, count: count as usize })
@@ -75,7 +93,9 @@ impl<'a> Document<'a> {
             .chunks_exact(raw.components)
             .map(|c| {
                 let mut out = [fill; N];
-                out.iter_mut().zip(c).for_each(|(o, &v)| *o = if normalized { raw.kind.normalized(v) } else { v as f32 });
+                out.iter_mut()
+                    .zip(c)
+                    .for_each(|(o, &v)| *o = if normalized { raw.kind.normalized(v) } else { v as f32 });
                 out
             })
             .collect())
@@ -101,12 +121,16 @@ impl<'a> Document<'a> {
         let (kind, components) = (Kind(kind.0), shape.multiplicity());
         let size = kind.0.size() * components;
         let mut values = match a.buffer_view {
-            Some(view) => kind.read(&self.items(view, a.byte_offset.unwrap_or_default().0, size, a.count.0)?),
+            Some(view) => {
+                let items = self.items(view, a.byte_offset.unwrap_or_default().0, size, a.count.0)?;
+                let left = self.left.get().checked_sub(a.count.0);
+                self.left.set(left.ok_or_else(|| bad("is read when every byte has been read 1,024 times over"))?);
+                kind.read(&items)
+            }
             None => {
                 // Zeros, which no bytes back: as many as the sparse part could sensibly fill.
                 let Some(sparse) = &a.sparse else { return Err(bad("has no bufferView")) };
-                let held: usize = self.buffers.iter().map(|b| b.len()).sum();
-                if a.count.0 < sparse.count.0 || a.count.0 > (held as u64).max(1 << 16) {
+                if a.count.0 < sparse.count.0 || a.count.0 > self.held().max(1 << 16) {
                     return Err(bad("claims more items than the file has bytes"));
                 }
                 vec![0.0; a.count.0 as usize * components]
@@ -116,7 +140,12 @@ impl<'a> Document<'a> {
             let Checked::Valid(IndexComponentType(index)) = s.indices.component_type else {
                 return Err(bad("its sparse indices have no valid type"));
             };
-            let at = Kind(index).read(&self.items(s.indices.buffer_view, s.indices.byte_offset.0, index.size(), s.count.0)?);
+            let at = Kind(index).read(&self.items(
+                s.indices.buffer_view,
+                s.indices.byte_offset.0,
+                index.size(),
+                s.count.0,
+            )?);
             let new = kind.read(&self.items(s.values.buffer_view, s.values.byte_offset.0, size, s.count.0)?);
             for (i, new) in at.into_iter().zip(new.chunks_exact(components)) {
                 let first = i as usize * components;

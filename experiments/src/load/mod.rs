@@ -99,13 +99,25 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Imported, LoadError> {
     let file = read(path, options)?;
     let mut builder = SceneBuilder::default();
     (builder.materials, builder.textures) = (file.materials, file.textures);
-    let mut ids = vec![];
-    for m in file.meshes {
-        let id = m.map(|(name, mesh)| builder.mesh(&name, mesh)).transpose();
-        ids.push(id.map_err(|e| LoadError::data(path, "meshes", e.to_string()))?);
+    let mut add = |name: &str, mesh: TriangleMesh| {
+        builder.mesh(name, mesh).map_err(|e| LoadError::data(path, "meshes", e.to_string()))
+    };
+    // A mirrored placement would turn its triangles inside out: it gets a mirrored mesh, so that no placement mirrors.
+    let mirror = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+    let mut placements = vec![];
+    let mut ids = vec![[None; 2]; file.meshes.len()];
+    for (i, transform) in file.placements {
+        let (name, mesh) = file.meshes[i].as_ref().expect("placements of empty meshes are gone");
+        let mirrored = transform.matrix3.determinant() < 0.0;
+        let id = match ids[i][usize::from(mirrored)] {
+            Some(id) => id,
+            None if mirrored => add(&format!("{name} (mirrored)"), merge(&[(mesh, mirror)]))?,
+            None => add(name, mesh.clone())?,
+        };
+        ids[i][usize::from(mirrored)] = Some(id);
+        placements.push((id, if mirrored { transform * mirror } else { transform }));
     }
-    for (part, transform) in file.placements {
-        let mesh = ids[part].expect("placements of empty meshes are gone");
+    for (mesh, transform) in placements {
         builder.place(Placement { mesh, transform: root * transform });
     }
     Ok(Imported { builder, warnings: file.warnings, counts: file.counts })
@@ -115,10 +127,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Imported, LoadError> {
 ///
 /// # Errors
 /// [`LoadError`] with the file, the place in it and the cause.
-pub fn load_mesh(
-    path: &Path,
-    options: &LoadOptions,
-) -> Result<(TriangleMesh, Vec<Material>, Vec<Texture>), LoadError> {
+pub fn load_mesh(path: &Path, options: &LoadOptions) -> Result<(TriangleMesh, Vec<Material>, Vec<Texture>), LoadError> {
     let root = root(path, options)?;
     let file = read(path, options)?;
     let placed: Vec<(&TriangleMesh, DAffine3)> = file
@@ -126,6 +135,11 @@ pub fn load_mesh(
         .iter()
         .map(|(i, m)| (&file.meshes[*i].as_ref().expect("placements of empty meshes are gone").1, root * *m))
         .collect();
+    let (vertices, indices) = placed.iter().fold((0, 0), |(v, i), (m, _)| (v + m.positions.len(), i + m.indices.len()));
+    if vertices.max(indices) > u32::MAX as usize {
+        let cause = format!("{vertices} vertices and {indices} indices are too many for one mesh: load it as a scene");
+        return Err(LoadError::data(path, "all placements", cause));
+    }
     let mesh = merge(&placed);
     if let Some(i) = mesh.positions.iter().position(|p| !p.is_finite()) {
         return Err(LoadError::data(path, format!("vertex {i}"), "is not finite once scaled and placed"));
@@ -134,6 +148,9 @@ pub fn load_mesh(
 }
 
 /// One mesh of everything placed, in the order of the placements; triangles that a mirroring turns inside out are turned back.
+///
+/// # Panics
+/// With more than 2^32 vertices or indices in all (the first is checked where wrapping would be silent).
 pub fn merge(placed: &[(&TriangleMesh, DAffine3)]) -> TriangleMesh {
     let mut out = TriangleMesh::default();
     let some = |f: fn(&TriangleMesh) -> bool| placed.iter().any(|(m, _)| !f(m));
@@ -141,7 +158,7 @@ pub fn merge(placed: &[(&TriangleMesh, DAffine3)]) -> TriangleMesh {
         (some(|m| m.normals.is_empty()), some(|m| m.uvs.is_empty()), some(|m| m.colors.is_empty()));
     let mut runs: Vec<(MaterialId, Vec<u32>)> = vec![];
     for (mesh, transform) in placed {
-        let first = out.positions.len() as u32;
+        let first = u32::try_from(out.positions.len()).expect("at most 2^32 vertices");
         out.positions.extend(mesh.positions.iter().map(|p| transform.transform_point3(p.as_dvec3()).as_vec3()));
         let n = mesh.positions.len();
         if normals {
@@ -155,9 +172,8 @@ pub fn merge(placed: &[(&TriangleMesh, DAffine3)]) -> TriangleMesh {
             } else {
                 &mesh.normals
             };
-            out.normals.extend(
-                given.iter().map(|n| (turn * n.as_dvec3()).try_normalize().map_or(Vec3::Y, |n| n.as_vec3())),
-            );
+            out.normals
+                .extend(given.iter().map(|n| (turn * n.as_dvec3()).try_normalize().map_or(Vec3::Y, |n| n.as_vec3())));
         }
         if uvs {
             out.uvs.extend_from_slice(&mesh.uvs);

@@ -18,7 +18,8 @@ pub(super) fn read_library(
 ) -> Vec<(String, Material)> {
     let folder = obj.parent().unwrap_or(Path::new(""));
     let whole = resolve(folder, names);
-    let files = if whole.is_file() { vec![whole] } else { names.split_whitespace().map(|n| resolve(folder, n)).collect() };
+    let files =
+        if whole.is_file() { vec![whole] } else { names.split_whitespace().map(|n| resolve(folder, n)).collect() };
     let mut out = vec![];
     for file in files {
         match bytes::read(&file) {
@@ -86,7 +87,8 @@ fn file_of(rest: &str) -> &str {
             _ => 1,
         };
         for k in 0..most {
-            let (word, further) = after.trim_start().split_once(char::is_whitespace).unwrap_or((after.trim_start(), ""));
+            let (word, further) =
+                after.trim_start().split_once(char::is_whitespace).unwrap_or((after.trim_start(), ""));
             // -o, -s and -t take one to three numbers.
             if k > 0 && word.parse::<f32>().is_err() {
                 break;

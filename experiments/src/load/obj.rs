@@ -75,7 +75,7 @@ pub(super) fn read(path: &Path, data: &[u8]) -> Result<Model, LoadError> {
     let mut model = Model { flat: true, ..Default::default() };
     let mut textures = Textures::default();
     let mut materials: HashMap<String, u32> = HashMap::new();
-    let mut given = BTreeSet::new();
+    let (mut given, mut libraries) = (BTreeSet::new(), BTreeSet::new());
     let mut material = None;
     let mut lists = Lists::default();
     let mut now = Building::new("unnamed");
@@ -146,6 +146,9 @@ pub(super) fn read(path: &Path, data: &[u8]) -> Result<Model, LoadError> {
                 }));
             }
             "mtllib" => {
+                if !libraries.insert(rest.trim().to_owned()) {
+                    continue;
+                }
                 for (name, m) in mtl::read_library(path, rest.trim(), &mut textures, &mut model.warnings) {
                     model.materials.push(m);
                     materials.insert(name, model.materials.len() as u32 - 1);
@@ -213,11 +216,8 @@ fn numbers<const N: usize>(rest: &str, least: usize) -> Result<[f64; N], String>
 fn corner(word: &str, lists: &Lists) -> Result<Corner, String> {
     let mut out = [u32::MAX; 3];
     let mut fields = word.split('/');
-    let of = [
-        ("vertex", lists.positions.len()),
-        ("texture coordinate", lists.uvs.len()),
-        ("normal", lists.normals.len()),
-    ];
+    let of =
+        [("vertex", lists.positions.len()), ("texture coordinate", lists.uvs.len()), ("normal", lists.normals.len())];
     for (k, (what, n)) in of.into_iter().enumerate() {
         let field = fields.next().unwrap_or("");
         if field.is_empty() {

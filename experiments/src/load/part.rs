@@ -72,7 +72,11 @@ impl Part {
         let mut keep = vec![true; self.triangles.len()];
         for (i, t) in self.triangles.iter().enumerate() {
             if let Some(v) = t.iter().find(|&&v| v as usize >= n) {
-                return Err(LoadError::data(file, self.place_of(i), format!("names vertex {v} of {n} (counted from 0)")));
+                return Err(LoadError::data(
+                    file,
+                    self.place_of(i),
+                    format!("names vertex {v} of {n} (counted from 0)"),
+                ));
             }
             let [a, b, c] = t.map(|v| self.positions[v as usize]);
             if let Some(k) = [a, b, c].iter().position(|p| !p.is_finite()) {
@@ -194,12 +198,14 @@ impl Model {
             let diagonal2 = (h - l).as_vec3().length_squared();
             if !diagonal2.is_finite() || !(l.as_vec3().is_finite() && h.as_vec3().is_finite()) {
                 let place = format!("\"{}\"", p.name);
-                let cause = format!("its box {l:?} .. {h:?} is too large: the square of its diagonal overflows 32-bit floats");
+                let cause =
+                    format!("its box {l:?} .. {h:?} is too large: the square of its diagonal overflows 32-bit floats");
                 return Err(LoadError::data(file, place, cause));
             }
             if diagonal2 < f32::MIN_POSITIVE {
                 let place = format!("\"{}\"", p.name);
-                let cause = format!("its box {l:?} .. {h:?} is too small: the square of its diagonal underflows 32-bit floats");
+                let cause =
+                    format!("its box {l:?} .. {h:?} is too small: the square of its diagonal underflows 32-bit floats");
                 return Err(LoadError::data(file, place, cause));
             }
             (low, high) = (low.min(l), high.max(h));

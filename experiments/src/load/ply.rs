@@ -10,9 +10,7 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{
-    ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
-};
+use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType};
 
 use super::part::{Model, Part};
 use super::texture::Textures;
@@ -120,9 +118,13 @@ impl Body<'_> {
     fn claim(&self, def: &ElementDef) -> Result<(), LoadError> {
         let least: u64 = match self.encoding {
             Encoding::Ascii => (2 * def.properties.len() as u64).max(1),
-            _ => def.properties.iter().map(|(_, p)| match &p.data_type {
-                PropertyType::Scalar(t) | PropertyType::List(t, _) => size(t),
-            }).sum(),
+            _ => def
+                .properties
+                .iter()
+                .map(|(_, p)| match &p.data_type {
+                    PropertyType::Scalar(t) | PropertyType::List(t, _) => size(t),
+                })
+                .sum(),
         };
         // The last line of an ascii file may lack its line break.
         let room = self.left() + u64::from(self.encoding == Encoding::Ascii);
@@ -158,13 +160,16 @@ impl Body<'_> {
                 Encoding::BinaryBigEndian => parser.read_big_endian_element(&mut self.data, def),
                 Encoding::BinaryLittleEndian => parser.read_little_endian_element(&mut self.data, def),
             };
-            f(i, read.map_err(|e| {
-                let place = match self.encoding {
-                    Encoding::Ascii => format!("line {} ({} {i})", self.line, def.name),
-                    _ => format!("{} {i} (byte {at} after the header)", def.name),
-                };
-                LoadError::data(self.path, place, said(&e))
-            })?);
+            f(
+                i,
+                read.map_err(|e| {
+                    let place = match self.encoding {
+                        Encoding::Ascii => format!("line {} ({} {i})", self.line, def.name),
+                        _ => format!("{} {i} (byte {at} after the header)", def.name),
+                    };
+                    LoadError::data(self.path, place, said(&e))
+                })?,
+            );
         }
         Ok(())
     }

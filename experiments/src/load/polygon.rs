@@ -2,9 +2,13 @@
 //!
 //! A polygon of n corners gives n - 2 triangles. Non-planar ones are judged in the plane of their Newell normal
 //! (I. Sutherland, R. Sproull, R. Schumacker, "A characterization of ten hidden-surface algorithms", 1974). Where
-//! ear clipping does not give n - 2 triangles (the outline crosses itself), the fan is taken. O(n) convex, O(n log n) else.
+//! ear clipping does not give n - 2 triangles (the outline crosses itself), and beyond 1,000 corners, where its worst case
+//! of O(n^2) would let a file stop the program, the fan is taken. O(n) convex, O(n log n) mostly else.
 
 use glam::DVec3;
+
+/// The most corners of a concave polygon.
+const MAX_EAR_CORNERS: usize = 1_000;
 
 /// Appends the triangles of the polygon, as indices into `corners`, in the polygon's winding.
 pub(super) fn triangulate(corners: &[DVec3], out: &mut Vec<[u32; 3]>) {
@@ -20,9 +24,9 @@ pub(super) fn triangulate(corners: &[DVec3], out: &mut Vec<[u32; 3]>) {
     // Newell: the sum of cross products of consecutive corners is twice the vector area.
     let area2 = (0..corners.len()).fold(DVec3::ZERO, |s, i| s + at(i).cross(at(i + 1)));
     let Some(normal) = area2.try_normalize() else { return out.extend(fan) };
-    let convex =
-        (0..corners.len()).all(|i| (at(i + 1) - at(i)).cross(at(i + 2) - at(i + 1)).dot(normal) >= -1e-9 * area2.length());
-    if convex {
+    let convex = (0..corners.len())
+        .all(|i| (at(i + 1) - at(i)).cross(at(i + 2) - at(i + 1)).dot(normal) >= -1e-9 * area2.length());
+    if convex || corners.len() > MAX_EAR_CORNERS {
         return out.extend(fan);
     }
     let (u, v) = normal.any_orthonormal_pair();
@@ -74,7 +78,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_polygon_gives_n_minus_2_triangles_of_its_vector_area(
+        fn any_polygon_gives_n_minus_2_triangles(
             xyz in prop::collection::vec((-1.0..1.0, -1.0..1.0, -1.0..1.0), 3..12)
         ) {
             let p: Vec<DVec3> = xyz.into_iter().map(|(x, y, z)| DVec3::new(x, y, z)).collect();
@@ -82,6 +86,29 @@ mod tests {
             triangulate(&p, &mut out);
             prop_assert_eq!(out.len(), p.len() - 2);
             prop_assert!(out.iter().flatten().all(|&i| (i as usize) < p.len()));
+        }
+
+        // A polygon that its centre sees whole is simple: its triangles wind as it does and add up to its area.
+        #[test]
+        fn stars_are_filled_exactly(
+            radii in prop::collection::vec(0.1f64..1.0, 3..12), tilt in -1.0f64..1.0
+        ) {
+            let n = radii.len() as f64;
+            let (s, c) = tilt.sin_cos();
+            let p: Vec<DVec3> = radii.iter().enumerate().map(|(i, r)| {
+                let a = i as f64 / n * std::f64::consts::TAU;
+                DVec3::new(r * a.cos(), r * a.sin() * c, r * a.sin() * s)
+            }).collect();
+            let normal = DVec3::new(0.0, -s, c);
+            let mut out = vec![];
+            triangulate(&p, &mut out);
+            let areas: Vec<f64> = out.iter().map(|t| {
+                let [a, b, c] = t.map(|i| p[i as usize]);
+                (b - a).cross(c - a).dot(normal) * 0.5
+            }).collect();
+            let want: f64 = (0..p.len()).map(|i| p[i].cross(p[(i + 1) % p.len()]).dot(normal) * 0.5).sum();
+            prop_assert!(areas.iter().all(|&a| a > -1e-12), "{:?}", areas);
+            prop_assert!((areas.iter().sum::<f64>() - want).abs() < 1e-12);
         }
     }
 }
