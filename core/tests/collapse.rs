@@ -6,9 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use collapse_reference::{Weighted, reference};
 use farfield_core::collapse::{
-    Candidate, Collapsed, Cost, LiveMesh, Mode, Placement, QuadricSettings, Quadrics, Settings, collapse,
+    Candidate, Collapsed, Cost, LiveMesh, Mode, Place, Placement, QuadricSettings, Quadrics, Settings, collapse,
 };
-use glam::{Vec3, vec3};
+use glam::{DVec3, Vec3, vec3};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -229,7 +229,7 @@ impl Cost for Hostile {
     fn costs(&mut self, _: &LiveMesh, _: &[[u32; 2]], out: &mut [Candidate]) {
         let costs = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 0.0, -0.0, 1.0, f32::MAX];
         for c in out {
-            let at = farfield_core::collapse::Place::At(noise(&mut self.0) * costs[self.0.random_range(0..8)]);
+            let at = Place::At(noise(&mut self.0) * costs[self.0.random_range(0..8)]);
             *c = Candidate { cost: costs[self.0.random_range(0..8)], place: at };
         }
     }
@@ -318,6 +318,66 @@ fn flat_and_collinear_neighbourhoods_collapse_for_nothing() {
             assert!((area - 108.0).abs() < 0.01, "{area}");
             assert!(run(&line, 1e-4).triangles.len() <= 8);
         }
+    }
+}
+
+/// Quadrics, and beside them every vertex's planes as a plain list: unit normal, a point, and the area as weight.
+struct Planes {
+    quadrics: Quadrics,
+    of: Vec<Vec<(DVec3, DVec3, f64)>>,
+    checked: usize,
+}
+
+impl Planes {
+    fn error(&self, ends: &[u32], at: Vec3) -> f64 {
+        let planes = || ends.iter().flat_map(|&v| &self.of[v as usize]);
+        let sum: f64 = planes().map(|(n, p, area)| area * n.dot(at.as_dvec3() - *p).powi(2)).sum();
+        (sum / planes().map(|p| p.2).sum::<f64>()).sqrt()
+    }
+}
+
+impl Cost for Planes {
+    fn costs(&mut self, mesh: &LiveMesh, edges: &[[u32; 2]], out: &mut [Candidate]) {
+        self.quadrics.costs(mesh, edges, out);
+        for (&[a, b], c) in edges.iter().zip(out) {
+            let (want, others) = match c.place {
+                Place::First => (self.error(&[b], mesh.position(a)), vec![self.error(&[a], mesh.position(b))]),
+                Place::Second => (self.error(&[a], mesh.position(b)), vec![self.error(&[b], mesh.position(a))]),
+                Place::At(p) => {
+                    let around = Vec3::AXES.iter().flat_map(|&x| [p + 0.05 * x, p - 0.05 * x]);
+                    let ends = [mesh.position(a), mesh.position(b)];
+                    (self.error(&[a, b], p), around.chain(ends).map(|p| self.error(&[a, b], p)).collect())
+                }
+            };
+            assert!((c.cost as f64 - want).abs() < 1e-4 + 1e-3 * want, "{} is not {want}", c.cost);
+            assert!(others.iter().all(|o| want < o + 1e-3), "{want} is not the least of {others:?}");
+            self.checked += 1;
+        }
+    }
+
+    fn collapsed(&mut self, mesh: &LiveMesh, from: u32, onto: u32, at: Vec3) {
+        self.quadrics.collapsed(mesh, from, onto, at);
+        let moved = std::mem::take(&mut self.of[from as usize]);
+        self.of[onto as usize].extend(moved);
+    }
+}
+
+#[test]
+fn quadrics_are_the_mean_squares_over_all_planes_gathered() {
+    for placement in [Placement::HalfEdge, Placement::Optimal] {
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let mesh = torus(20, 15, 0.1, &mut rng);
+        let live = LiveMesh::new(&mesh.0, &mesh.1, &[]).unwrap();
+        let settings = QuadricSettings { placement, border_weight: 0.0, shape_weight: 0.0 };
+        let plane = |&t: &u32| {
+            let [a, b, c] = live.corners(t).map(|v| live.position(v).as_dvec3());
+            let n = (b - a).cross(c - a);
+            (n.normalize(), a, n.length() / 2.0)
+        };
+        let of = (0..live.vertices() as u32).map(|v| live.triangles_of(v).iter().map(plane).collect()).collect();
+        let mut cost = Planes { quadrics: Quadrics::new(&live, settings), of, checked: 0 };
+        let out = collapse(live, &mut cost, &Settings { min_triangles: 100, ..Settings::default() });
+        assert!(out.collapses > 200 && cost.checked > 2000, "{} {}", out.collapses, cost.checked);
     }
 }
 

@@ -39,6 +39,8 @@ pub(super) struct Queue {
     heap: Vec<Entry>,
     /// Edges of slot `STOCK`, each at least once, and some that have left.
     stock: Vec<u32>,
+    /// Scratch of a refill.
+    seen: Vec<Entry>,
     /// What costs at most this is in the heap.
     limit: f32,
     max_cost: f32,
@@ -52,6 +54,7 @@ impl Queue {
             edges: Vec::new(),
             heap: Vec::new(),
             stock: Vec::new(),
+            seen: Vec::new(),
             limit: f32::NEG_INFINITY,
             max_cost,
             spots: vec![Spot { mark: 0, edge: 0, held: 0 }; vertices],
@@ -162,7 +165,7 @@ impl Queue {
     }
 
     fn refill(&mut self) {
-        let mut seen = Vec::with_capacity(self.stock.len());
+        let mut seen = std::mem::take(&mut self.seen);
         for &edge in &self.stock {
             let e = &mut self.edges[edge as usize];
             if e.slot == STOCK {
@@ -177,7 +180,7 @@ impl Queue {
         }
         let share = (seen.len() / 8).max(4096).min(seen.len()) - 1;
         self.limit = seen.select_nth_unstable_by(share, |a, b| a.cost.total_cmp(&b.cost)).1.cost;
-        for entry in seen {
+        for entry in seen.drain(..) {
             let e = &mut self.edges[entry.edge as usize];
             if entry.cost <= self.limit {
                 e.slot = self.heap.len() as u32;
@@ -187,6 +190,7 @@ impl Queue {
                 self.stock.push(entry.edge);
             }
         }
+        self.seen = seen;
         for at in (0..self.heap.len().div_ceil(ARITY)).rev() {
             self.sink(at, self.heap[at]);
         }
