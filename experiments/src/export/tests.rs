@@ -7,7 +7,9 @@ use glam::{DAffine3, DQuat, DVec3, Vec2, Vec3};
 use super::*;
 use crate::load::{LoadOptions, load, load_mesh, merge};
 
-fn scene() -> (Vec<(String, TriangleMesh)>, Vec<(usize, DAffine3)>, Vec<Material>, Vec<Texture>) {
+type Made = (Vec<(String, TriangleMesh)>, Vec<(usize, DAffine3)>, Vec<Material>, Vec<Texture>);
+
+fn scene() -> Made {
     let mut tetrahedron = TriangleMesh {
         positions: vec![Vec3::new(0.1, 0.2, 0.3), Vec3::X, Vec3::Y, Vec3::Z],
         uvs: vec![Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE],

@@ -196,7 +196,7 @@ impl Model {
                 continue;
             }
             let diagonal2 = (h - l).as_vec3().length_squared();
-            if !diagonal2.is_finite() || !(l.as_vec3().is_finite() && h.as_vec3().is_finite()) {
+            if !(diagonal2.is_finite() && l.as_vec3().is_finite() && h.as_vec3().is_finite()) {
                 let place = format!("\"{}\"", p.name);
                 let cause =
                     format!("its box {l:?} .. {h:?} is too large: the square of its diagonal overflows 32-bit floats");

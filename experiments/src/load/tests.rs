@@ -24,7 +24,7 @@ fn merged(name: &str, data: impl AsRef<[u8]>) -> Loaded {
 
 #[track_caller]
 fn check_refused(name: &str, data: impl AsRef<[u8]>, want: &[&str]) {
-    let e = merged(name, data).err().expect("is refused").to_string();
+    let e = merged(name, data).expect_err("is refused").to_string();
     assert!(e.contains(name), "{e}");
     want.iter().for_each(|w| assert!(e.contains(w), "{e} lacks {w}"));
 }
