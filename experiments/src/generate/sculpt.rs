@@ -2,7 +2,7 @@
 //!
 //! The field is meshed on a lattice finer than asked for, evened out, and collapsed to the very count, so that triangles
 //! stand where the shape needs them. Relief finer than the mesh can hold is left out: every count gets as much detail as it can
-//! carry. About 4 s of one core for 200,000 triangles.
+//! carry. About 4 s of one core for 200,000 triangles, 9 s for all of the 2M park.
 
 use glam::{Mat3, Vec3};
 
