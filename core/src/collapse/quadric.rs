@@ -45,7 +45,7 @@ pub struct QuadricSettings {
 
 impl Default for QuadricSettings {
     fn default() -> Self {
-        Self { placement: Placement::default(), border_weight: 10.0, shape_weight: 1e-6 }
+        Self { placement: Placement::default(), border_weight: 0.3, shape_weight: 1e-6 }
     }
 }
 
