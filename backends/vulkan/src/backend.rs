@@ -68,7 +68,7 @@ impl VulkanBackend {
     ///
     /// # Errors
     /// [`Fault::Device`] where there is no loader, no driver, no device that serves, or validation is asked for and not
-    /// installed; [`Fault::Refused`] or [`Fault::Data`] naming a texture that the device cannot hold or that lacks texels.
+    /// installed; [`Fault::Data`] naming a texture that is unsound or too large for the device.
     pub fn new(scene: &Scene, options: Options) -> Result<Self, Fault> {
         let gpu = Arc::new(Gpu::open(options.validation, options.device.as_deref())?);
         let info =

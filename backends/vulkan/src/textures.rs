@@ -6,6 +6,7 @@ use ash::vk;
 use farfield_core::Fault;
 use farfield_core::payload::AtlasPart;
 use farfield_core::scene::Scene;
+use farfield_shaders::records::check_textures;
 
 use crate::descriptors::{Bound, SetLayouts, Sets};
 use crate::gpu::Gpu;
@@ -55,8 +56,7 @@ impl SceneTextures {
     /// Uploads them.
     ///
     /// # Errors
-    /// [`Fault::Data`] naming a texture whose texels do not fill it, [`Fault::Refused`] where it is too large for the
-    /// device, [`Fault::Device`].
+    /// [`Fault::Data`] naming a texture that is unsound or too large for the device, [`Fault::Device`].
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
         layouts: &SetLayouts,
@@ -64,15 +64,12 @@ impl SceneTextures {
         by: &mut Submitter,
         scene: &Scene,
     ) -> Result<Self, Fault> {
+        check_textures(scene, gpu.caps.limits.max_image_dimension2_d)?;
         let repeat = Sampler::new(gpu, vk::SamplerAddressMode::REPEAT)?;
         let (mut pool, mut sets, mut images) = (Sets::new(gpu), vec![], vec![]);
         let white = ("white", [1, 1], &[[255u8; 4]][..]);
         let all = scene.textures.iter().map(|t| (t.name.as_str(), t.size, &t.rgba[..])).chain([white]);
         for (name, size, texels) in all {
-            if texels.len() != size[0] as usize * size[1] as usize {
-                let cause = format!("{} x {} texels, but {} are there", size[0], size[1], texels.len());
-                return Err(Fault::Data { place: format!("texture \"{name}\""), cause });
-            }
             let shape = texels_of(vk::Format::R8G8B8A8_SRGB, size, 1, false);
             let image = Image::new(gpu, name, &shape)?;
             staging.fill(by, &image, size, bytemuck::cast_slice(texels))?;
