@@ -31,18 +31,16 @@ pub type Make<'a> = &'a dyn Fn(&Scene) -> Box<dyn Backend>;
 /// # Panics
 /// Where the backend differs, saying in what: it is a test's body.
 pub fn suite(make: Make<'_>) {
-    let parts: [(&str, fn(Make<'_>)); 8] = [
-        ("contract", contract::all),
-        ("geometry", geometry::all),
-        ("facing", facing::all),
-        ("paint", paint::all),
-        ("projected", projected::all),
-        ("light", light::all),
-        ("reference: soup", reference::soup),
-        ("reference: instances", reference::instances),
-    ];
-    for (name, part) in parts {
+    let part = |name: &str, run: fn(Make<'_>)| {
         println!("conformance: {name}");
-        part(make);
-    }
+        run(make);
+    };
+    part("contract", contract::all);
+    part("geometry", geometry::all);
+    part("facing", facing::all);
+    part("paint", paint::all);
+    part("projected", projected::all);
+    part("light", light::all);
+    part("reference: soup", reference::soup);
+    part("reference: instances", reference::instances);
 }

@@ -92,7 +92,7 @@ impl TriangleBvh {
                 _ => Aabb::EMPTY,
             })
             .collect();
-        let tree = Tree::build(&boxes, 6);
+        let tree = Tree::build(&boxes, 4);
         let triangles =
             tree.order.iter().map(|&i| Triangle::new(corners(i as usize).unwrap_or([Vec3::ZERO; 3]))).collect();
         Self { tree, triangles }
