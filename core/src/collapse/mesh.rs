@@ -126,7 +126,7 @@ impl LiveMesh {
             for &t in self.triangles_of(v) {
                 for x in others(self.corners(t), v) {
                     // Emptied at the first look; later ones see a balanced pair.
-                    let [forth, back] = std::mem::replace(&mut count[x as usize], [0, 0]);
+                    let [forth, back] = std::mem::take(&mut count[x as usize]);
                     flags |=
                         if forth != back { ODD } else { 0 } | if matches!(forth + back, 0 | 2) { 0 } else { BORDER };
                 }
