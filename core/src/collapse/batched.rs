@@ -29,7 +29,7 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
         block: vec![[0; 2]; BLOCK + 3],
         out: Vec::new(),
     };
-    let mut chosen: Vec<([u32; 2], f32)> = Vec::new();
+    let mut chosen: Vec<[u32; 2]> = Vec::new();
     let rules = Rules::new(&mesh, settings);
     let mut state = Batched { mesh, cost, rules, collapses: 0, max_cost: 0.0 };
     let mut starved = false;
@@ -52,17 +52,24 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
             // Before the collapse: it changes the rings.
             if !starved {
                 state.touch(ends, &mut touched);
-                chosen.push((ends, price));
-            } else if state.take(ends, price) {
-                state.touch(ends, &mut touched);
+                chosen.push(ends);
+            } else {
+                let mut best = [Candidate::FORBIDDEN];
+                state.cost.costs(&state.mesh, &[ends], &mut best);
+                if state.take(ends, &best[0]) {
+                    state.touch(ends, &mut touched);
+                }
             }
         }
-        chosen.sort_unstable_by_key(|c| c.0);
-        for &(ends, price) in &chosen {
+        chosen.sort_unstable();
+        edges.out.clear();
+        edges.out.resize(chosen.len(), Candidate::FORBIDDEN);
+        state.cost.costs(&state.mesh, &chosen, &mut edges.out);
+        for (&ends, best) in chosen.iter().zip(&edges.out) {
             if state.mesh.live_triangles() <= settings.min_triangles {
                 break;
             }
-            state.take(ends, price);
+            state.take(ends, best);
         }
         let done = state.collapses - before;
         if starved && done == 0 {
@@ -97,10 +104,7 @@ impl<C: Cost + ?Sized> Batched<'_, C> {
     }
 
     /// Collapses an edge if it may be.
-    fn take(&mut self, ends: [u32; 2], price: f32) -> bool {
-        let mut best = [Candidate::FORBIDDEN];
-        self.cost.costs(&self.mesh, &[ends], &mut best);
-        let Candidate { cost, place } = best[0];
+    fn take(&mut self, ends: [u32; 2], &Candidate { cost, place }: &Candidate) -> bool {
         if cost.is_nan() || cost == f32::INFINITY || !self.rules.allow(&self.mesh, ends, place) {
             return false;
         }
@@ -108,7 +112,7 @@ impl<C: Cost + ?Sized> Batched<'_, C> {
         self.cost.collapsed(&self.mesh, from, onto, at);
         self.mesh.apply(from, onto, at);
         self.collapses += 1;
-        self.max_cost = self.max_cost.max(price);
+        self.max_cost = self.max_cost.max(cost);
         true
     }
 }

@@ -7,7 +7,7 @@
 //! What limits it: memory latency. A collapse touches some 12 triangles, 14 vertices and 20 edges that lie where they lay in the
 //! input; in the heap, a price that falls below the current limit moves through about log4 of its length.
 
-use super::mesh::{LiveMesh, others};
+use super::mesh::{LiveMesh, corner, others};
 use super::queue::Queue;
 use super::rules::Rules;
 use super::{BLOCK, Candidate, Collapsed, Cost, Reach, Settings, resolve};
@@ -214,12 +214,6 @@ fn other(ends: [u32; 2], v: u32) -> u32 {
 /// The two edges of a triangle at its corner `v`, each with its other end.
 #[inline]
 fn spokes(corners: [u32; 3], v: u32) -> [(usize, u32); 2] {
-    let [a, b, c] = corners;
-    if a == v {
-        [(0, b), (2, c)]
-    } else if b == v {
-        [(1, c), (0, a)]
-    } else {
-        [(2, a), (1, b)]
-    }
+    let [at, next, last] = corner(corners, v);
+    [(at, corners[next]), (last, corners[last])]
 }
