@@ -34,6 +34,15 @@ pub(super) fn read(path: &Path, data: &[u8]) -> Result<Model, LoadError> {
         return Err(LoadError::unsupported(path, "extensionsRequired", cause));
     }
     root.extensions_required.clear();
+    // gltf-json 1.4 looks up a primitive's positions before it has checked their index, and panics.
+    for (i, m) in root.meshes.iter().enumerate() {
+        for (k, p) in m.primitives.iter().enumerate() {
+            if let Some(a) = p.attributes.values().map(Index::value).find(|&a| a >= root.accessors.len()) {
+                let cause = format!("an attribute names accessor {a} of {}", root.accessors.len());
+                return Err(LoadError::data(path, format!("meshes[{i}].primitives[{k}]"), cause));
+            }
+        }
+    }
     let mut first = None;
     root.validate(&root, gltf::json::Path::new, &mut |at, e| {
         first.get_or_insert_with(|| (at().to_string(), e.to_string()));

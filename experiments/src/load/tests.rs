@@ -303,6 +303,12 @@ fn gltf_strips_fans_quantised_positions_and_nodes() {
 }
 
 #[test]
+fn gltf_attributes_of_an_application_are_skipped() {
+    let text = gltf().replace(r#"{"POSITION":1}"#, r#"{"POSITION":1,"_WEIGHT":1}"#);
+    assert_eq!(merged("a.gltf", text).unwrap().0.triangles(), 4);
+}
+
+#[test]
 fn gltf_sparse_accessors_replace_values() {
     let text = gltf().replace(
         r#"{"bufferView":3,"componentType":5126,"type":"VEC3","count":4}"#,
@@ -332,6 +338,11 @@ fn gltf_errors_name_the_place() {
         &["extensionsRequired", "draco", "supported are"],
     );
     check_refused("a.gltf", swap(r#""mesh":1"#, r#""mesh":5"#), &["nodes[2].mesh"]);
+    check_refused(
+        "a.gltf",
+        swap(r#"{"POSITION":1}"#, r#"{"POSITION":7}"#),
+        &["meshes[1].primitives[0]: an attribute names accessor 7 of 3"],
+    );
     check_refused("a.gltf", swap("[1,2]", "[1,0]"), &["nodes[0]: is reached twice"]);
     check_refused(
         "a.gltf",
@@ -400,7 +411,7 @@ const WORDS: [&str; 12] =
     ["-1", "0", "4294967295", "99999999999999999999", "1e39", "nan", "inf", "\n", "/", "null", "\"\"", "[]"];
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 512, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: 8192, ..Default::default() })]
 
     #[test]
     fn random_bytes_never_panic(kind in 0usize..4, data in prop::collection::vec(any::<u8>(), 0..400), seed in 0usize..8, keep in 0usize..80) {
