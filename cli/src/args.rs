@@ -1,0 +1,115 @@
+//! What the command line takes.
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand};
+
+/// Experiments with far-field rendering.
+#[derive(Debug, Parser)]
+#[command(version, about)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// Threads of all parallel work; without it one a core.
+    #[arg(long, global = true)]
+    pub(crate) threads: Option<usize>,
+    /// No progress bars.
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
+}
+
+/// An experiment file with its overrides.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Input {
+    /// The experiment file (TOML).
+    pub(crate) file: PathBuf,
+    /// Overrides a setting: `view.frames=8`, `hybrid.far_field.edge_px=3`. May be given several times.
+    #[arg(long = "set", value_name = "PATH=VALUE")]
+    pub(crate) sets: Vec<String>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Every registered strategy and backend, its settings with defaults, units and source.
+    List {
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+        /// As the book's reference page.
+        #[arg(long, conflicts_with = "json")]
+        markdown: bool,
+    },
+    /// Validates an experiment and prints it resolved.
+    Check {
+        #[command(flatten)]
+        input: Input,
+    },
+    /// What will be built and what is left out, with reasons and estimated sizes.
+    Plan {
+        #[command(flatten)]
+        input: Input,
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Preprocessing only; resumable.
+    Build {
+        #[command(flatten)]
+        input: Input,
+        /// Where what is built is kept.
+        #[arg(long, default_value = "store")]
+        store: PathBuf,
+    },
+    /// Builds what is missing, walks the path, measures, writes results and a report.
+    Run {
+        #[command(flatten)]
+        input: Input,
+        /// Where results go; without it `out/` and the experiment's name.
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// Where what is built is kept.
+        #[arg(long, default_value = "store")]
+        store: PathBuf,
+    },
+    /// One frame of one pipeline, as PNG or, with its layers, as EXR.
+    Render {
+        #[command(flatten)]
+        input: Input,
+        /// The pipeline's name, with swept values as `list`ed by `check`.
+        #[arg(long)]
+        pipeline: String,
+        /// The frame's number.
+        #[arg(long)]
+        frame: usize,
+        /// The picture: .png or .exr.
+        #[arg(long)]
+        out: PathBuf,
+        /// Where what is built is kept.
+        #[arg(long, default_value = "store")]
+        store: PathBuf,
+    },
+    /// Joins runs into one table and one plot of error against time.
+    Compare {
+        /// Folders that `run` wrote.
+        #[arg(required = true)]
+        runs: Vec<PathBuf>,
+        /// The joined report.
+        #[arg(long, default_value = "compare.html")]
+        out: PathBuf,
+    },
+    /// Generates a scene as .glb, .obj or .ply.
+    Scene {
+        /// What to generate.
+        #[arg(value_parser = ["park"])]
+        kind: String,
+        /// Triangles in all.
+        #[arg(long, default_value_t = 2_017_700)]
+        triangles: u64,
+        /// Seed.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// The file.
+        #[arg(long)]
+        out: PathBuf,
+    },
+}

@@ -1,0 +1,226 @@
+//! Building: the cells that a path needs, in parallel, into the store.
+//!
+//! Every bake's key is the hash of all that it may depend on (scene, views, resolved settings, the cell, the scene's asset,
+//! the capturer, the strategies' versions), so that a build resumes where it was stopped, and pipelines that differ in other
+//! things share their cells.
+
+mod division;
+mod executor;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use farfield_core::Fault;
+use farfield_core::camera::ViewModel;
+use farfield_core::cell::Cell;
+use farfield_core::context::{Capture, Context};
+use farfield_core::id::CellId;
+use farfield_core::scene::Scene;
+use farfield_core::strategy::{CellJob, Covers, LeftOut, Needs, SceneJob};
+use rayon::prelude::*;
+
+pub use division::{Division, divide};
+pub use executor::{NoCapture, Pool, capture};
+
+use crate::config::Pipeline;
+use crate::failure::Failure;
+use crate::progress::Progress;
+use crate::results::Preprocess;
+use crate::store::{Key, Manifest, Recorder, Store, StoreMemo, decode, encode, key};
+
+/// What all builds of an experiment share.
+pub struct Site<'a> {
+    /// The scene.
+    pub scene: &'a Arc<Scene>,
+    /// The views to come.
+    pub views: &'a ViewModel,
+    /// The store.
+    pub store: &'a Store,
+    /// Takes pictures.
+    pub capture: &'a dyn Capture,
+    /// Set to stop.
+    pub cancel: &'a AtomicBool,
+    /// Shows how far it is.
+    pub progress: &'a Progress,
+}
+
+/// One cell, built.
+pub struct BuiltCell {
+    /// Its inside.
+    pub cell: Cell,
+    /// Its asset; empty where the far field builds nothing for cells.
+    pub manifest: Manifest,
+}
+
+/// A pipeline, built.
+pub struct Built {
+    /// The scene's asset, where the far field has one.
+    pub shared: Option<Manifest>,
+    /// The needed cells.
+    pub cells: BTreeMap<CellId, BuiltCell>,
+    /// What the far field draws.
+    pub covers: Covers,
+    /// What was left out and why, each once.
+    pub left_out: Vec<LeftOut>,
+    /// What it cost.
+    pub preprocess: Preprocess,
+}
+
+impl Site<'_> {
+    fn context<'b>(&'b self, memo: &'b StoreMemo<'b>) -> Context<'b> {
+        Context { capture: self.capture, run: &Pool, memo, cancel: self.cancel }
+    }
+
+    fn memo(&self) -> StoreMemo<'_> {
+        let inputs = key("memory", &[&self.scene.digest, self.capture.identity().as_bytes()]);
+        StoreMemo { store: self.store, inputs }
+    }
+
+    /// The parts of a key that every block of a pipeline has.
+    fn base(&self, kind: &str, settings: &serde_json::Value, version: u32) -> Result<Key, Fault> {
+        Ok(key(
+            kind,
+            &[&self.scene.digest, &encode(self.views)?, settings.to_string().as_bytes(), &version.to_le_bytes()],
+        ))
+    }
+
+    /// Builds a pipeline's needed cells.
+    ///
+    /// # Errors
+    /// [`Failure::Cancelled`], or what the stages give, with the pipeline and cell.
+    pub fn build(&self, pipeline: &Pipeline, division: &Division) -> Result<Built, Failure> {
+        let failed = |f| Failure::during(format!("pipeline \"{}\"", pipeline.name), f);
+        let start = Instant::now();
+        let scene_needs = pipeline.far_field.needs(self.scene, None).map_err(failed)?;
+        let shared = if scene_needs.scene_asset { Some(self.scene_asset(pipeline).map_err(failed)?) } else { None };
+        let bar = self.progress.cells(&pipeline.name, division.needed.len());
+        let made: Vec<Result<(CellId, BuiltCell, Needs, bool), Failure>> = division
+            .needed
+            .par_iter()
+            .map(|&id| {
+                let of_cell = |f| Failure::during(format!("pipeline \"{}\", cell {}", pipeline.name, id.0), f);
+                let one = self.cell(pipeline, division, id, shared.as_ref()).map_err(of_cell);
+                bar.inc();
+                one
+            })
+            .collect();
+        bar.done();
+        let (mut cells, mut left_out, mut cells_built) = (BTreeMap::new(), BTreeSet::new(), 0);
+        let mut note = |all: &[LeftOut]| {
+            left_out.extend(all.iter().map(|l| (l.decided.clone(), l.stage.clone(), l.reason.clone())))
+        };
+        note(&scene_needs.left_out);
+        let mut covers = scene_needs.covers;
+        for one in made {
+            let (id, built, needs, new) = one?;
+            note(&needs.left_out);
+            note(&built.manifest.left_out);
+            covers = needs.covers;
+            cells_built += usize::from(new);
+            cells.insert(id, built);
+        }
+        note(&division.left_out());
+        let bytes = |m: &Manifest| m.bytes() + m.index.len() as u64;
+        let shared_bytes = shared.as_ref().map_or(0, |s| bytes(&s.1));
+        let preprocess = Preprocess {
+            seconds: if cells_built > 0 { start.elapsed().as_secs_f64() } else { 0.0 },
+            cells_built,
+            cells_needed: division.needed.len(),
+            cells_total: division.cells.outlines().len(),
+            bytes_stored: cells.values().map(|c| bytes(&c.manifest)).sum::<u64>() + shared_bytes,
+            peak_rss_bytes: peak_rss_bytes(),
+        };
+        let left_out =
+            left_out.into_iter().rev().map(|(decided, stage, reason)| LeftOut { stage, reason, decided }).collect();
+        Ok(Built { shared: shared.map(|s| s.1), cells, covers, left_out, preprocess })
+    }
+
+    /// The asset with this key, if it is whole: every payload's checksum holds.
+    fn whole(&self, asset: &Key) -> Option<Manifest> {
+        let manifest: Manifest = decode(&self.store.get(asset)?).ok()?;
+        manifest.payloads.values().all(|p| self.store.check(&p.key).is_some()).then_some(manifest)
+    }
+
+    fn scene_asset(&self, pipeline: &Pipeline) -> Result<(Key, Manifest), Fault> {
+        let settings = &pipeline.resolved["far_field"];
+        let base = self.base("scene asset", settings, pipeline.far_field.version())?;
+        let asset = key("scene asset", &[&base, self.capture.identity().as_bytes()]);
+        if let Some(known) = self.whole(&asset) {
+            return Ok((asset, known));
+        }
+        let sink = Recorder::new(self.store, asset);
+        let memo = self.memo();
+        let index = pipeline.far_field.bake_scene(
+            &SceneJob { scene: self.scene, views: self.views },
+            &sink,
+            &self.context(&memo),
+        )?;
+        Ok((asset, sink.finish(index)?))
+    }
+
+    fn cell(
+        &self,
+        pipeline: &Pipeline,
+        division: &Division,
+        id: CellId,
+        shared: Option<&(Key, Manifest)>,
+    ) -> Result<(CellId, BuiltCell, Needs, bool), Fault> {
+        let memo = self.memo();
+        let cx = self.context(&memo);
+        cx.check()?;
+        let (inside, cell) = self.inside(pipeline, division, id, &cx)?;
+        let needs = pipeline.far_field.needs(self.scene, Some(&cell))?;
+        if !needs.cell_asset {
+            return Ok((id, BuiltCell { cell, manifest: Manifest::default() }, needs, false));
+        }
+        let base = self.base("cell asset", &pipeline.resolved["far_field"], pipeline.far_field.version())?;
+        let identity = if needs.captures { self.capture.identity() } else { "" };
+        let outlines = if needs.neighbour_cells { encode(&division.cells.outlines())? } else { vec![] };
+        let shared_key = shared.map_or([0; 32], |s| s.0);
+        let asset = key("cell asset", &[&base, &inside, identity.as_bytes(), &outlines, &shared_key]);
+        if let Some(manifest) = self.whole(&asset) {
+            return Ok((id, BuiltCell { cell, manifest }, needs, false));
+        }
+        let sink = Recorder::new(self.store, asset);
+        let job = CellJob {
+            scene: self.scene,
+            views: self.views,
+            cell: &cell,
+            outlines: division.cells.outlines(),
+            shared: shared.map(|s| s.1.index.as_slice()),
+        };
+        let index = pipeline.far_field.bake_cell(&job, &sink, &cx)?;
+        let manifest = sink.finish(index)?;
+        Ok((id, BuiltCell { cell, manifest }, needs, true))
+    }
+
+    /// A cell's inside, from the store or made, and the hash of its bytes.
+    fn inside(
+        &self,
+        pipeline: &Pipeline,
+        division: &Division,
+        id: CellId,
+        cx: &Context<'_>,
+    ) -> Result<(Key, Cell), Fault> {
+        let base = self.base("cell", &pipeline.resolved["partition"], pipeline.partition.version())?;
+        let name = key("cell", &[&base, &id.0.to_le_bytes()]);
+        if let Some(bytes) = self.store.get(&name)
+            && let Ok(cell) = decode(&bytes)
+        {
+            return Ok((key("inside", &[&bytes]), cell));
+        }
+        let cell = division.cells.inside(id, self.scene, cx)?;
+        let bytes = encode(&cell)?;
+        self.store.put(&name, &bytes).map_err(|e| Fault::Data { place: "store".into(), cause: e.to_string() })?;
+        Ok((key("inside", &[&bytes]), cell))
+    }
+}
+
+/// The process's peak resident set, bytes; 0 where the system does not tell.
+pub fn peak_rss_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<u64>().ok()).unwrap_or(0) * 1024
+}

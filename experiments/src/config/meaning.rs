@@ -1,0 +1,147 @@
+//! What a table of settings cannot say: keys that exclude each other, lists of whole numbers, ranges in order, names that
+//! refer to something, files that are there.
+
+use std::path::Path;
+
+use serde_json::{Map, Value};
+
+use super::mistakes::Collector;
+use super::node::{At, Node};
+use crate::path::PATHS;
+
+/// Checks, and makes paths absolute and the reference explicit.
+pub(super) fn check(
+    root: &Node,
+    resolved: &mut Map<String, Value>,
+    pipelines: &[Map<String, Value>],
+    folder: &Path,
+    mistakes: &mut Collector<'_>,
+) {
+    scene(root, resolved, folder, mistakes);
+    view(root, resolved, folder, mistakes);
+    light(root, resolved, mistakes);
+    reference(root, resolved, pipelines, mistakes);
+}
+
+/// The place of `table.key`: of its value, of the table, or the file's start.
+fn at(root: &Node, table: &str, key: &str) -> At {
+    let table = root.get(table);
+    table.and_then(|t| t.get(key)).or(table).map_or(At::default(), |n| n.at.clone())
+}
+
+fn absolute(folder: &Path, path: &str) -> String {
+    let joined = folder.join(path);
+    std::path::absolute(&joined).unwrap_or(joined).to_string_lossy().into_owned()
+}
+
+fn scene(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes: &mut Collector<'_>) {
+    if root.get("scene").is_none() {
+        return;
+    }
+    let Some(scene) = resolved["scene"].as_object_mut() else { return };
+    let help = Some("source = \"park\" generates a scene, path = \"model.glb\" loads one".to_owned());
+    match (scene.contains_key("source"), scene.contains_key("path")) {
+        (true, true) => {
+            mistakes.add(&at(root, "scene", "path"), "[scene] has both `source` and `path`", "one of the two", help)
+        }
+        // A `source` that is there and wrong has been told already.
+        (false, false) if root.get("scene").is_some_and(|s| s.get("source").is_none() && s.get("path").is_none()) => {
+            mistakes.add(&at(root, "scene", ""), "[scene] needs `source` or `path`", "neither is here", help);
+        }
+        _ => {}
+    }
+    for (key, wanted) in [("path", "file"), ("models", "folder")] {
+        if let Some(path) = scene.get(key).and_then(Value::as_str).map(str::to_owned) {
+            let full = absolute(folder, &path);
+            let there = if wanted == "file" { Path::new(&full).is_file() } else { Path::new(&full).is_dir() };
+            if !there {
+                mistakes.add(&at(root, "scene", key), format!("there is no {wanted} {full}"), "not there", None);
+            }
+            scene.insert(key.into(), full.into());
+        }
+    }
+}
+
+fn view(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes: &mut Collector<'_>) {
+    let Some(view) = resolved["view"].as_object_mut() else { return };
+    let numbers = |v: &Map<String, Value>, key: &str| -> Vec<f64> {
+        v.get(key).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_f64).collect()
+    };
+    if numbers(view, "resolution").iter().any(|x| x.fract() != 0.0 || !(1.0..=16384.0).contains(x)) {
+        let message = "`resolution` is two whole numbers of pixels from 1 to 16384";
+        mistakes.add(&at(root, "view", "resolution"), message, "not a resolution", None);
+    }
+    for (key, low, high) in [("eye_height", f64::MIN, f64::MAX), ("pitch_deg", -85.0, 85.0)] {
+        let r = numbers(view, key);
+        if r.len() == 2 && !(r[0] <= r[1] && r[0] >= low && r[1] <= high) {
+            let bounds = if key == "pitch_deg" { " within -85 to 85 degrees" } else { "" };
+            let message = format!("`{key}` is a range [lowest, highest]{bounds}, not [{}, {}]", r[0], r[1]);
+            mistakes.add(&at(root, "view", key), message, "not a range", None);
+        }
+    }
+    if let Some(path) = view.get("path").and_then(Value::as_str).map(str::to_owned) {
+        if Path::new(&path).extension().is_some_and(|e| e == "csv") {
+            let full = absolute(folder, &path);
+            if !Path::new(&full).is_file() {
+                mistakes.add(&at(root, "view", "path"), format!("there is no file {full}"), "not there", None);
+            }
+            view.insert("path".into(), full.into());
+        } else if !PATHS.contains(&path.as_str()) {
+            let help = format!("paths: {}, or a .csv of key frames", PATHS.join(", "));
+            mistakes.add(&at(root, "view", "path"), format!("no path is called \"{path}\""), "unknown", Some(help));
+        }
+    }
+}
+
+fn light(root: &Node, resolved: &Map<String, Value>, mistakes: &mut Collector<'_>) {
+    let Some(light) = resolved["light"].as_object() else { return };
+    let numbers = |key: &str| -> Vec<f64> {
+        light.get(key).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_f64).collect()
+    };
+    if numbers("to_light").iter().all(|&x| x == 0.0) && light.contains_key("to_light") {
+        mistakes.add(&at(root, "light", "to_light"), "`to_light` has no direction", "all zero", None);
+    }
+    for key in ["color", "ambient"] {
+        if numbers(key).iter().any(|&x| x < 0.0) {
+            mistakes.add(&at(root, "light", key), format!("`{key}` is negative"), "light is 0 or more", None);
+        }
+    }
+    for key in ["sky", "ground"] {
+        if numbers(key).iter().any(|x| x.fract() != 0.0 || !(0.0..=255.0).contains(x)) {
+            let message = format!("`{key}` is three whole numbers from 0 to 255 (sRGB)");
+            mistakes.add(&at(root, "light", key), message, "not a colour", None);
+        }
+    }
+}
+
+fn reference(
+    root: &Node,
+    resolved: &mut Map<String, Value>,
+    pipelines: &[Map<String, Value>],
+    mistakes: &mut Collector<'_>,
+) {
+    let names: Vec<&str> = pipelines.iter().filter_map(|p| p.get("name")?.as_str()).collect();
+    let Some(reference) = resolved["reference"].as_object_mut() else { return };
+    match reference.get("pipeline").and_then(Value::as_str) {
+        Some(n) if !names.contains(&n) => {
+            let near = super::mistakes::nearest(n, names.iter().copied());
+            let label = near.map_or("no such pipeline".into(), |n| format!("did you mean \"{n}\"?"));
+            let help =
+                format!("pipelines: {}", names.iter().map(|n| format!("\"{n}\"")).collect::<Vec<_>>().join(", "));
+            mistakes.add(
+                &at(root, "reference", "pipeline"),
+                format!("no pipeline is called \"{n}\""),
+                label,
+                Some(help),
+            );
+        }
+        Some(_) => {}
+        None => {
+            if let Some(first) =
+                names.first().filter(|_| root.get("reference").is_none_or(|r| r.get("pipeline").is_none()))
+            {
+                reference.insert("pipeline".into(), (*first).into());
+            }
+        }
+    }
+}

@@ -1,0 +1,397 @@
+//! `run`, `build` and `render`: from an experiment to what it leaves behind.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use farfield_core::Camera;
+use farfield_core::camera::ViewModel;
+use farfield_core::claim::Quantity;
+use farfield_core::context::Capture;
+use farfield_core::draw::Shading;
+use farfield_core::scene::Scene;
+
+use crate::audit::{self, Measured};
+use crate::build::{self, Built, Division, NoCapture, Site};
+use crate::config::{BackendName, BudgetSettings, Experiment, Pipeline, to_toml};
+use crate::failure::Failure;
+use crate::gallery::Gallery;
+use crate::measure::{self, EQUAL_FRAMES_NOTE, FrameErrors, Metrics, Rendered};
+use crate::progress::Progress;
+use crate::report;
+use crate::results::{
+    BoundAudit, FrameRow, Machine, MeanMax, PipelineSummary, SCHEMA, SceneFacts, Summary, Times, TriangleCounts,
+};
+use crate::store::Store;
+use crate::walk::{Device, Opened, References, Tour, Walked, Walker, device, frame};
+use crate::{path, scene};
+
+/// Seed of the audits' viewpoints: fixed, so that runs compare.
+const AUDIT_SEED: u64 = 0x0061_7564_6974;
+
+/// What a command gets beside the experiment.
+pub struct Options<'a> {
+    /// The store's folder.
+    pub store: PathBuf,
+    /// No progress bars.
+    pub quiet: bool,
+    /// Set to stop.
+    pub cancel: &'a AtomicBool,
+    /// Told what the user should know, line by line.
+    pub say: &'a (dyn Fn(&str) + Sync),
+}
+
+/// An experiment with its scene, path and cells: everything that needs no building.
+pub struct Prepared {
+    /// The scene.
+    pub scene: Arc<Scene>,
+    /// Where it came from.
+    pub source: String,
+    /// The views.
+    pub views: ViewModel,
+    /// The path.
+    pub cameras: Vec<Camera>,
+    /// Light and background.
+    pub shading: Shading,
+    /// Each pipeline's cells.
+    pub divisions: Vec<Division>,
+}
+
+/// Loads the scene, lays the path and divides the viewpoints; far fields are asked whether they serve the scene.
+///
+/// # Errors
+/// [`Failure::Input`]: nothing has been written.
+pub fn prepare(experiment: &Experiment, options: &Options<'_>) -> Result<Prepared, Failure> {
+    let loaded = scene::scene(experiment)?;
+    loaded.warnings.iter().for_each(|w| (options.say)(&format!("warning: {w}")));
+    let scene = Arc::new(loaded.scene);
+    let views = path::views(&experiment.view, &scene);
+    let cameras = path::cameras(&experiment.view, &views, &scene)?;
+    let mut divisions = vec![];
+    for p in &experiment.pipelines {
+        divisions.push(build::divide(p, &scene, &views, &cameras, options.cancel)?);
+        let refused = |f| Failure::before(format!("pipeline \"{}\": its far field", p.name), f);
+        p.far_field.needs(&scene, None).map_err(refused)?;
+    }
+    let shading = scene::shading(&experiment.light);
+    Ok(Prepared { scene, source: loaded.source, views, cameras, shading, divisions })
+}
+
+fn open_store(options: &Options<'_>) -> Result<Store, Failure> {
+    let failed = |e| Failure::work(format!("the store {} cannot be used", options.store.display()), e);
+    // The messages outlive this call's borrow, so they go to standard error themselves.
+    Store::open(&options.store, Box::new(|message| eprintln!("{message}"))).map_err(failed)
+}
+
+/// The captures that the pipelines need, if any does.
+fn captures(experiment: &Experiment, prepared: &Prepared, which: &[usize]) -> Result<Box<dyn Capture>, Failure> {
+    let mut needed = false;
+    for &i in which {
+        let p = &experiment.pipelines[i];
+        let needs = p.far_field.needs(&prepared.scene, None);
+        needed |= needs.map_err(|f| Failure::before(format!("pipeline \"{}\"", p.name), f))?.captures;
+    }
+    if !needed {
+        return Ok(Box::new(NoCapture));
+    }
+    device::available(experiment.build.capture)?;
+    let failed = |f| Failure::during(format!("captures by {}", experiment.build.capture.name()), f);
+    build::capture(experiment.build.capture, &prepared.scene).map_err(failed)
+}
+
+/// Builds what `which` pipelines need and the store lacks.
+///
+/// # Errors
+/// As [`Site::build`].
+pub fn build_pipelines(
+    experiment: &Experiment,
+    prepared: &Prepared,
+    which: &[usize],
+    store: &Store,
+    options: &Options<'_>,
+) -> Result<Vec<Built>, Failure> {
+    let capture = captures(experiment, prepared, which)?;
+    let progress = Progress::new(options.quiet);
+    let site = Site {
+        scene: &prepared.scene,
+        views: &prepared.views,
+        store,
+        capture: &*capture,
+        cancel: options.cancel,
+        progress: &progress,
+    };
+    which.iter().map(|&i| site.build(&experiment.pipelines[i], &prepared.divisions[i])).collect()
+}
+
+/// `build`: preprocessing only; what it did, in lines.
+///
+/// # Errors
+/// As [`prepare`] and [`Site::build`].
+pub fn build(experiment: &Experiment, options: &Options<'_>) -> Result<String, Failure> {
+    let prepared = prepare(experiment, options)?;
+    let store = open_store(options)?;
+    let all: Vec<usize> = (0..experiment.pipelines.len()).collect();
+    let built = build_pipelines(experiment, &prepared, &all, &store, options)?;
+    let line = |(p, b): (&Pipeline, &Built)| {
+        let w = &b.preprocess;
+        format!(
+            "{}: {} of {} needed cells built in {:.1} s ({} in the partition), {:.1} MB stored\n",
+            p.name,
+            w.cells_built,
+            w.cells_needed,
+            w.seconds,
+            w.cells_total,
+            w.bytes_stored as f64 / 1e6
+        )
+    };
+    let mut out: String = experiment.pipelines.iter().zip(&built).map(line).collect();
+    out += &format!("store: {}, peak memory {:.0} MB\n", store.root().display(), build::peak_rss_bytes() as f64 / 1e6);
+    Ok(out)
+}
+
+/// `run`: builds what is missing, walks, measures, audits, writes; returns the table of results.
+///
+/// # Errors
+/// As [`prepare`], [`Site::build`] and the walk; what writing gives.
+pub fn run(experiment: &Experiment, out: &Path, options: &Options<'_>) -> Result<String, Failure> {
+    let backends = device::choose(&experiment.pipelines, &mut |line| (options.say)(&line))?;
+    let prepared = prepare(experiment, options)?;
+    let store = open_store(options)?;
+    let all: Vec<usize> = (0..experiment.pipelines.len()).collect();
+    let built = build_pipelines(experiment, &prepared, &all, &store, options)?;
+
+    let io = |e: std::io::Error| Failure::work(format!("results cannot be written to {}", out.display()), e);
+    std::fs::create_dir_all(out.join("frames")).map_err(io)?;
+    let references = References::new(prepared.views.resolution).map_err(io)?;
+    let mut devices: BTreeMap<BackendName, Device> = BTreeMap::new();
+    let mut gallery = Gallery::new(experiment.measure.pictures);
+    let mut done: BTreeMap<usize, (PipelineSummary, Vec<FrameRow>)> = BTreeMap::new();
+    let mut order = all.clone();
+    order.sort_by_key(|&i| i != experiment.reference);
+    for i in order {
+        if let std::collections::btree_map::Entry::Vacant(v) = devices.entry(backends[i]) {
+            v.insert(Device::new(device::open(backends[i], &prepared.scene)?));
+        }
+        let device = devices.get_mut(&backends[i]).ok_or(Failure::Cancelled)?;
+        let one = One { experiment, prepared: &prepared, built: &built[i], store: &store, options, index: i };
+        done.insert(i, one.walk(device, &references, &mut gallery)?);
+    }
+    let rows: Vec<FrameRow> = done.values().flat_map(|d| d.1.clone()).collect();
+    let summary = summary(experiment, &prepared, done.into_values().map(|d| d.0).collect());
+    let shown = gallery.finish(&references, &out.join("frames")).map_err(io)?;
+    std::fs::write(out.join("resolved.toml"), to_toml(&experiment.resolved)).map_err(io)?;
+    report::write(out, &summary, &rows, &shown).map_err(io)?;
+    Ok(report::table(&[("run".to_owned(), summary)]))
+}
+
+fn summary(experiment: &Experiment, prepared: &Prepared, pipelines: Vec<PipelineSummary>) -> Summary {
+    Summary {
+        schema: SCHEMA,
+        device: Machine {
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+        },
+        scene: SceneFacts {
+            source: prepared.source.clone(),
+            triangles: prepared.scene.triangles(),
+            objects: prepared.scene.objects.len(),
+            chunks: prepared.scene.chunks.len(),
+            frames: prepared.cameras.len(),
+            resolution_px: prepared.views.resolution,
+        },
+        reference: experiment.pipelines[experiment.reference].name.clone(),
+        equal_frames_note: EQUAL_FRAMES_NOTE.into(),
+        pipelines,
+    }
+}
+
+/// One pipeline's walk.
+struct One<'a> {
+    experiment: &'a Experiment,
+    prepared: &'a Prepared,
+    built: &'a Built,
+    store: &'a Store,
+    options: &'a Options<'a>,
+    index: usize,
+}
+
+impl One<'_> {
+    fn pipeline(&self) -> &Pipeline {
+        &self.experiment.pipelines[self.index]
+    }
+
+    fn is_reference(&self) -> bool {
+        self.index == self.experiment.reference
+    }
+
+    fn walk(
+        &self,
+        device: &mut Device,
+        references: &References,
+        gallery: &mut Gallery,
+    ) -> Result<(PipelineSummary, Vec<FrameRow>), Failure> {
+        let (e, p) = (self.experiment, self.prepared);
+        let name = &self.pipeline().name;
+        let division = &p.divisions[self.index];
+        let opened = Opened::new(self.pipeline(), division, self.built, &p.scene, self.store)?;
+        let tour = Tour {
+            scene: &p.scene,
+            views: &p.views,
+            shading: &p.shading,
+            cameras: &p.cameras,
+            frames_per_s: e.view.frames_per_s,
+            measure: &e.measure,
+        };
+        // What others are compared with may not lack anything.
+        let budget = if self.is_reference() { BudgetSettings::default() } else { e.budget.clone() };
+        let info = device.backend.info().clone();
+        let mut walker = Walker::new(&tour, &opened, device, &budget);
+        let metrics = Metrics { ssim: e.measure.ssim, flip: e.measure.flip };
+        let (mut walked, mut rows, mut errors): (Vec<Walked>, Vec<FrameRow>, Vec<FrameErrors>) =
+            (vec![], vec![], vec![]);
+        let bar = Progress::new(self.options.quiet).frames(name, p.cameras.len());
+        let failed = |i: usize| move |f| Failure::during(format!("pipeline \"{name}\", frame {i}"), f);
+        let io = |e: std::io::Error| Failure::work("the reference's pictures cannot be kept", e);
+        for (i, camera) in p.cameras.iter().enumerate() {
+            if self.options.cancel.load(Ordering::Relaxed) {
+                return Err(Failure::Cancelled);
+            }
+            let w = walker.step(camera).map_err(failed(i))?;
+            let mut row = row(name, i, &w);
+            if i % e.measure.every == 0 {
+                let candidate = walker.read().map_err(failed(i))?;
+                if self.is_reference() {
+                    references.keep(i, &candidate).map_err(io)?;
+                } else {
+                    let found = measure::frame(&references.get(i).map_err(io)?, &candidate, metrics);
+                    with_errors(&mut row, &found);
+                    gallery.consider(name, i, i / e.measure.every, &found, candidate.picture);
+                    errors.push(found);
+                }
+            }
+            rows.push(row);
+            walked.push(w);
+            bar.inc();
+        }
+        bar.done();
+        let measured = walker.audit(e.measure.audit_views, AUDIT_SEED).map_err(failed(p.cameras.len()))?;
+        let of = |pick: fn(&Walked) -> u64| MeanMax::of(walked.iter().map(|w| pick(w) as f64));
+        let times: Vec<f64> = walked.iter().map(|w| w.frame_ms).collect();
+        let ratios: Vec<f64> =
+            walked.iter().filter_map(|w| w.cell).map(|c| opened.original_over_simplified(c)).collect();
+        let summary = PipelineSummary {
+            name: name.clone(),
+            strategies: serde_json::Value::Object(self.pipeline().resolved.clone()),
+            device: info,
+            preprocess: self.built.preprocess,
+            frame_ms: Times::of(&times),
+            frame_ms_source: if walked.iter().all(|w| w.by_gpu) { "gpu timestamps" } else { "wall clock" }.into(),
+            triangles: TriangleCounts {
+                near: of(|w| w.near_triangles),
+                far: of(|w| w.far_triangles),
+                shadow: MeanMax::default(),
+                total: of(|w| w.near_triangles + w.far_triangles),
+            },
+            points: MeanMax::default(),
+            texture_bytes: walked.iter().map(|w| w.texture_bytes).max().unwrap_or(0),
+            resident_bytes: walked.iter().map(|w| w.resident_bytes).max().unwrap_or(0),
+            frames_outside_cells: walked.iter().filter(|w| w.cell.is_none()).count(),
+            original_over_simplified: MeanMax::of(ratios).mean,
+            error: (!self.is_reference()).then(|| measure::summary(&errors)),
+            bounds: self.bounds(&measured),
+            left_out: self.built.left_out.clone(),
+        };
+        Ok((summary, rows))
+    }
+
+    /// Near triangles are the partition's to claim, holes the far field's.
+    fn bounds(&self, measured: &[Measured]) -> Vec<BoundAudit> {
+        let claimant = |key: &str| self.pipeline().resolved[key]["type"].as_str().unwrap_or_default().to_owned();
+        let by = |near: bool| -> Vec<Measured> {
+            measured.iter().copied().filter(|m| (m.quantity == Quantity::NearTriangles) == near).collect()
+        };
+        let mut out = audit::join(&claimant("partition"), &by(true));
+        out.extend(audit::join(&claimant("far_field"), &by(false)));
+        out
+    }
+}
+
+fn row(pipeline: &str, frame: usize, w: &Walked) -> FrameRow {
+    FrameRow {
+        pipeline: pipeline.to_owned(),
+        frame,
+        cell: w.cell.map(|c| c.0),
+        frame_ms: w.frame_ms,
+        near_triangles: w.near_triangles,
+        far_triangles: w.far_triangles,
+        missing_blocks: w.missing,
+        texture_bytes: w.texture_bytes,
+        ..FrameRow::default()
+    }
+}
+
+fn with_errors(row: &mut FrameRow, e: &FrameErrors) {
+    row.psnr_y_db = Some(e.luminance.psnr_db());
+    row.psnr_y_object_db = (e.luminance_on_objects.pixels > 0).then(|| e.luminance_on_objects.psnr_db());
+    (row.ssim, row.flip, row.hole_fraction) = (e.ssim, e.flip, Some(e.hole_fraction));
+}
+
+/// `render`: one frame of one pipeline, all of it resident.
+///
+/// # Errors
+/// [`Failure::Input`] where there is no such pipeline or frame; as [`run`] otherwise.
+pub fn render(
+    experiment: &Experiment,
+    pipeline: &str,
+    number: usize,
+    options: &Options<'_>,
+) -> Result<(Camera, Rendered), Failure> {
+    let Some(i) = experiment.pipelines.iter().position(|p| p.name == pipeline) else {
+        let names: Vec<String> = experiment.pipelines.iter().map(|p| format!("\"{}\"", p.name)).collect();
+        return Err(Failure::input(
+            format!("no pipeline is called \"{pipeline}\""),
+            format!("pipelines: {}", names.join(", ")),
+        ));
+    };
+    if number >= experiment.view.frames {
+        let cause = format!("the path has frames 0 to {}", experiment.view.frames - 1);
+        return Err(Failure::input(format!("there is no frame {number}"), cause));
+    }
+    let backends = device::choose(&experiment.pipelines[i..=i], &mut |line| (options.say)(&line))?;
+    let mut prepared = prepare(experiment, options)?;
+    let camera = prepared.cameras[number];
+    // Only this frame's cell is needed.
+    let division = &mut prepared.divisions[i];
+    division.needed = division.path[number].into_iter().collect();
+    let store = open_store(options)?;
+    let built = build_pipelines(experiment, &prepared, &[i], &store, options)?;
+    let opened = Opened::new(&experiment.pipelines[i], &prepared.divisions[i], &built[0], &prepared.scene, &store)?;
+    let mut device = Device::new(device::open(backends[0], &prepared.scene)?);
+    let failed = |f| Failure::during(format!("pipeline \"{pipeline}\", frame {number}"), f);
+    let rendered = render_at(&opened, &mut device, &prepared, &camera).map_err(failed)?;
+    Ok((camera, rendered))
+}
+
+/// A pipeline's picture from any viewpoint, everything it may draw there resident; nothing is timed.
+///
+/// # Errors
+/// What loading and drawing give.
+pub fn render_at(
+    opened: &Opened<'_>,
+    device: &mut Device,
+    prepared: &Prepared,
+    camera: &Camera,
+) -> Result<Rendered, farfield_core::Fault> {
+    let fetch = |b| opened.fetch(b);
+    for id in prepared.scene.mesh_chunk_ids() {
+        device.load(farfield_core::id::Block::Chunk(id), &prepared.scene, &fetch)?;
+    }
+    let cell = opened.cell_of(camera);
+    for block in cell.map(|c| opened.payloads(c)).unwrap_or_default() {
+        device.load(block, &prepared.scene, &fetch)?;
+    }
+    let drawn = opened.draws(cell, camera, &|_| true);
+    device.backend.render(&frame(camera, drawn.draws, &prepared.shading))?;
+    crate::walk::read(&mut *device.backend)
+}

@@ -1,0 +1,150 @@
+//! From `[scene]` and `[light]` to a scene and its shading.
+
+use std::path::Path;
+
+use farfield_core::draw::Shading;
+use farfield_core::id::MaterialId;
+use farfield_core::mesh::TriangleMesh;
+use farfield_core::scene::{Light, LightKind, Material, Placement, Scene, SceneBuilder, Texture};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+
+use crate::config::{Experiment, LightSettings, SceneSettings, Up};
+use crate::export::{Export, ExportError, export};
+use crate::failure::Failure;
+use crate::generate::{self, PAPER_MODELS, ParkScene, ParkSettings, park, park_of};
+use crate::load::{self, LoadOptions};
+
+/// A loaded or generated scene.
+pub struct Loaded {
+    /// The scene.
+    pub scene: Scene,
+    /// Where it came from, for results.
+    pub source: String,
+    /// What importers left out or guessed.
+    pub warnings: Vec<String>,
+}
+
+/// Loads or generates an experiment's scene.
+///
+/// # Errors
+/// [`Failure::Input`] with the file, the place and the cause.
+pub fn scene(experiment: &Experiment) -> Result<Loaded, Failure> {
+    let s = &experiment.scene;
+    let to_world = DAffine3::from_translation(DVec3::from(s.offset)) * DAffine3::from_scale(DVec3::splat(s.scale));
+    match &s.path {
+        Some(path) => file(s, path),
+        None => generated(s, to_world),
+    }
+}
+
+fn file(s: &SceneSettings, path: &str) -> Result<Loaded, Failure> {
+    let up = match s.up {
+        Up::Y => load::Up::Y,
+        Up::Z => load::Up::Z,
+    };
+    let options = LoadOptions { up, scale: s.scale, two_sided: s.two_sided };
+    let refused = |e: &dyn ToString| Failure::input("the scene was not loaded", e.to_string());
+    let mut imported = load::load(Path::new(path), &options).map_err(|e| refused(&e))?;
+    imported.builder.shift(DVec3::from(s.offset));
+    let scene = imported.builder.build().map_err(|e| refused(&e))?;
+    if scene.triangles() == 0 {
+        return Err(refused(&format!("{path}: there is no triangle in it")));
+    }
+    Ok(Loaded { scene, source: path.to_owned(), warnings: imported.warnings })
+}
+
+fn generated(s: &SceneSettings, to_world: DAffine3) -> Result<Loaded, Failure> {
+    let settings = ParkSettings { triangles: s.triangles, seed: s.seed };
+    let refused = |e: &dyn ToString| Failure::input("the scene was not generated", e.to_string());
+    let two_sided = s.two_sided.unwrap_or(false);
+    let (park, materials, textures, source) = match &s.models {
+        None => (park(&settings).map_err(|e| refused(&e))?, vec![statue(two_sided)], vec![], "park".to_owned()),
+        Some(folder) => {
+            let (park, materials, textures) = of_models(&settings, Path::new(folder), two_sided)?;
+            (park, materials, textures, format!("park of {folder}"))
+        }
+    };
+    let scene = placed(park, materials, textures, to_world).map_err(|e| refused(&e))?;
+    Ok(Loaded { scene, source, warnings: vec![] })
+}
+
+/// The park of the paper's models, read from a folder.
+fn of_models(
+    settings: &ParkSettings,
+    folder: &Path,
+    two_sided: bool,
+) -> Result<(ParkScene, Vec<Material>, Vec<Texture>), Failure> {
+    let refused = |e: &dyn ToString| Failure::input("the park's models were not loaded", e.to_string());
+    let (mut materials, mut textures, mut meshes) = (vec![], vec![], vec![]);
+    for model in &PAPER_MODELS {
+        let options = LoadOptions { two_sided: Some(two_sided), ..LoadOptions::default() };
+        let (mut mesh, own, images) = load::load_mesh(&folder.join(model.file), &options).map_err(|e| refused(&e))?;
+        let (first_material, first_texture) = (materials.len() as u32, textures.len() as u32);
+        mesh.sections.iter_mut().for_each(|s| s.1 = MaterialId(s.1.0 + first_material));
+        materials.extend(own.into_iter().map(|mut m: Material| {
+            m.texture.iter_mut().for_each(|t| t.0 += first_texture);
+            m
+        }));
+        textures.extend(images);
+        meshes.push(mesh);
+    }
+    let meshes: [TriangleMesh; 8] = meshes.try_into().map_err(|_| refused(&"there are eight kinds of statues"))?;
+    let park = park_of(settings, &PAPER_MODELS, meshes).map_err(|e| refused(&e))?;
+    Ok((park, materials, textures))
+}
+
+fn placed(
+    park: ParkScene,
+    materials: Vec<Material>,
+    textures: Vec<Texture>,
+    to_world: DAffine3,
+) -> Result<Scene, farfield_core::Fault> {
+    let mut builder = SceneBuilder::default();
+    (builder.materials, builder.textures) = (materials, textures);
+    let ids = park.meshes.into_iter().map(|(name, mesh)| builder.mesh(name, mesh)).collect::<Result<Vec<_>, _>>()?;
+    for p in &park.placements {
+        builder.place(Placement { mesh: ids[p.kind as usize], transform: to_world * transform(p) });
+    }
+    builder.build()
+}
+
+/// A sculpted park to be written to a file.
+///
+/// # Errors
+/// [`Failure::Input`] where there is no such park.
+pub fn generate_park(triangles: u64, seed: u64) -> Result<ParkScene, Failure> {
+    park(&ParkSettings { triangles, seed }).map_err(|e| Failure::input("the scene was not generated", e))
+}
+
+/// Writes a park: one node a statue.
+///
+/// # Errors
+/// What writing gives; a wrong format is [`Failure::Input`].
+pub fn write_park(file: &Path, park: ParkScene) -> Result<(), Failure> {
+    let placements: Vec<(usize, DAffine3)> = park.placements.iter().map(|p| (p.kind as usize, transform(p))).collect();
+    let meshes: Vec<(String, TriangleMesh)> = park.meshes.into_iter().map(|(n, m)| (n.to_owned(), m)).collect();
+    let materials = [statue(false)];
+    let scene = Export { meshes: &meshes, placements: &placements, materials: &materials, textures: &[] };
+    export(file, &scene).map_err(|e| match e {
+        ExportError::Unsupported { .. } => Failure::input("the scene was not written", e),
+        ExportError::Write { .. } => Failure::work("the scene was not written", e),
+    })
+}
+
+/// Sculpted statues carry their colours in their vertices.
+fn statue(two_sided: bool) -> Material {
+    Material { name: "statue".into(), base_color: [1.0; 4], texture: None, two_sided }
+}
+
+/// From a statue's mesh to the park.
+fn transform(p: &generate::Placement) -> DAffine3 {
+    DAffine3::from_mat3_translation(DMat3::from_rotation_y(p.yaw_rad) * p.scale, p.position)
+}
+
+/// The shading that every pipeline gets.
+pub fn shading(l: &LightSettings) -> Shading {
+    let color = Vec3::from(l.color);
+    let kind = LightKind::Directional { to_light: Vec3::from(l.to_light).normalize(), angle_rad: 0.0 };
+    let lights = if color == Vec3::ZERO { vec![] } else { vec![Light { kind, color, moves: false }] };
+    Shading { ambient: Vec3::from(l.ambient), lights, sky: l.sky, ground: l.ground }
+}

@@ -1,0 +1,135 @@
+//! The content-addressed store: what was built, by a hash of all that it was built from.
+//!
+//! A block's file name is its key. It appears whole or not at all (written aside, synced, renamed), carries a checksum, and is
+//! never changed, so that builds can be killed and resumed, and several processes may share a store. A block whose checksum
+//! fails is reported, removed and built again. Layout: `blocks/ab/cdef...`, and `aside/` for what is being written.
+
+mod keys;
+mod manifest;
+mod memo;
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+pub use keys::{Key, key};
+pub use manifest::{Manifest, Recorder, Stored, decode, encode};
+pub use memo::StoreMemo;
+
+/// Begins every block.
+const MAGIC: &[u8; 4] = b"FFB1";
+/// Magic, length before compression, checksum of the length and of what follows.
+const HEADER: usize = 4 + 8 + 32;
+/// zstd's own default: the store is written once and read a few times.
+const COMPRESSION: i32 = 3;
+
+/// A folder of blocks.
+pub struct Store {
+    root: PathBuf,
+    serial: AtomicU64,
+    /// Told of damaged blocks.
+    report: Box<dyn Fn(String) + Send + Sync>,
+}
+
+impl Store {
+    /// Opens or makes a store, and clears what killed processes left aside.
+    ///
+    /// # Errors
+    /// What making the folders gives.
+    pub fn open(root: &Path, report: Box<dyn Fn(String) + Send + Sync>) -> io::Result<Self> {
+        fs::create_dir_all(root.join("blocks"))?;
+        let aside = root.join("aside");
+        fs::create_dir_all(&aside)?;
+        for file in fs::read_dir(&aside)? {
+            let file = file?.path();
+            let owner = file.file_name().and_then(|n| n.to_str()?.split('-').next()?.parse::<u32>().ok());
+            // Its writer may be another process that is alive.
+            if owner.is_none_or(|pid| !Path::new("/proc").join(pid.to_string()).exists() || pid == std::process::id()) {
+                _ = fs::remove_file(file);
+            }
+        }
+        Ok(Self { root: root.to_owned(), serial: AtomicU64::new(0), report })
+    }
+
+    /// The folder.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    fn file(&self, key: &Key) -> PathBuf {
+        let name = key.iter().map(|b| format!("{b:02x}")).collect::<String>();
+        self.root.join("blocks").join(&name[..2]).join(&name[2..])
+    }
+
+    /// A block's bytes; `None` where it is absent or was damaged.
+    pub fn get(&self, key: &Key) -> Option<Vec<u8>> {
+        let bytes = self.whole(key)?;
+        let raw = u64::from_le_bytes(bytes[4..12].try_into().ok()?);
+        match zstd::bulk::decompress(&bytes[HEADER..], usize::try_from(raw).ok()?) {
+            Ok(raw) => Some(raw),
+            Err(e) => self.damaged(key, &e.to_string()),
+        }
+    }
+
+    /// The size of a block's file where it is there and its checksum holds.
+    pub fn check(&self, key: &Key) -> Option<u64> {
+        self.whole(key).map(|b| b.len() as u64)
+    }
+
+    /// A block's file, checked.
+    fn whole(&self, key: &Key) -> Option<Vec<u8>> {
+        let bytes = match fs::read(self.file(key)) {
+            Ok(b) => b,
+            Err(e) if e.kind() == io::ErrorKind::NotFound => return None,
+            Err(e) => return self.damaged(key, &e.to_string()),
+        };
+        if bytes.len() < HEADER || &bytes[..4] != MAGIC {
+            return self.damaged(key, "it has no header");
+        }
+        if checksum(&bytes[4..12], &bytes[HEADER..]) != bytes[12..HEADER] {
+            return self.damaged(key, "its checksum fails");
+        }
+        Some(bytes)
+    }
+
+    fn damaged<T>(&self, key: &Key, why: &str) -> Option<T> {
+        let file = self.file(key);
+        (self.report)(format!("stored block {} is damaged ({why}); it is built again", file.display()));
+        _ = fs::remove_file(file);
+        None
+    }
+
+    /// Stores a block, unless it is there, and returns its file's size.
+    ///
+    /// # Errors
+    /// What writing gives; the block is then not there.
+    pub fn put(&self, key: &Key, raw: &[u8]) -> io::Result<u64> {
+        if let Some(bytes) = self.check(key) {
+            return Ok(bytes);
+        }
+        let packed = zstd::bulk::compress(raw, COMPRESSION)?;
+        let number = self.serial.fetch_add(1, Ordering::Relaxed);
+        let aside = self.root.join("aside").join(format!("{}-{number}", std::process::id()));
+        let mut file = File::create(&aside)?;
+        let length = (raw.len() as u64).to_le_bytes();
+        file.write_all(MAGIC)?;
+        file.write_all(&length)?;
+        file.write_all(&checksum(&length, &packed))?;
+        file.write_all(&packed)?;
+        file.sync_all()?;
+        let home = self.file(key);
+        let folder = home.parent().unwrap_or(&self.root);
+        fs::create_dir_all(folder)?;
+        fs::rename(&aside, &home)?;
+        File::open(folder)?.sync_all()?;
+        Ok((HEADER + packed.len()) as u64)
+    }
+}
+
+fn checksum(length: &[u8], packed: &[u8]) -> [u8; 32] {
+    *blake3::Hasher::new().update(length).update(packed).finalize().as_bytes()
+}
+
+#[cfg(test)]
+mod tests;

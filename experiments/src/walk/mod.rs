@@ -1,0 +1,217 @@
+//! Walking a path with a pipeline: per frame the cell, the scheduler's plan, the draw list, the time, the counts; on measured
+//! frames the picture.
+//!
+//! Only [`farfield_core::backend::Backend::render`] is timed. The reference is walked first and without a budget; its measured
+//! pictures wait in a temporary folder for those that are compared with them.
+
+pub mod device;
+mod opened;
+mod reference;
+mod residency;
+
+use farfield_core::backend::Backend;
+use farfield_core::camera::ViewModel;
+use farfield_core::draw::Shading;
+use farfield_core::id::{Block, CellId};
+use farfield_core::scene::Scene;
+use farfield_core::strategy::{Motion, Planner};
+use farfield_core::{Camera, Fault};
+
+pub use opened::{Drawn, Opened, frame};
+pub use reference::References;
+pub use residency::{Device, Residency};
+
+use crate::audit::{CellAudit, Measured};
+use crate::config::{BudgetSettings, MeasureSettings};
+use crate::measure::Rendered;
+use opened::{PICTURE, SURFACE, Wants, asset_of};
+
+/// What all walks of an experiment share.
+pub struct Tour<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The views.
+    pub views: &'a ViewModel,
+    /// Light and background.
+    pub shading: &'a Shading,
+    /// The path.
+    pub cameras: &'a [Camera],
+    /// Frames a second of the path.
+    pub frames_per_s: f32,
+    /// What is measured.
+    pub measure: &'a MeasureSettings,
+}
+
+/// One pipeline on one device.
+pub struct Walker<'a> {
+    tour: &'a Tour<'a>,
+    opened: &'a Opened<'a>,
+    device: &'a mut Device,
+    residency: Residency,
+    planner: Box<dyn Planner>,
+    upload_bytes_per_frame: Option<u64>,
+    last: Option<Camera>,
+    frames: usize,
+}
+
+/// A frame, timed and counted.
+pub struct Walked {
+    /// The cell that served it.
+    pub cell: Option<CellId>,
+    /// Time, milliseconds.
+    pub frame_ms: f64,
+    /// By the device's own clock.
+    pub by_gpu: bool,
+    /// Original triangles.
+    pub near_triangles: u64,
+    /// Payload triangles.
+    pub far_triangles: u64,
+    /// Blocks not there.
+    pub missing: u32,
+    /// Bytes resident.
+    pub resident_bytes: u64,
+    /// Bytes of resident texels.
+    pub texture_bytes: u64,
+}
+
+impl<'a> Walker<'a> {
+    /// At the start of the path. A reference gets no budget.
+    pub fn new(tour: &'a Tour<'a>, opened: &'a Opened<'a>, device: &'a mut Device, budget: &BudgetSettings) -> Self {
+        device.free_payloads();
+        Self {
+            tour,
+            opened,
+            device,
+            residency: Residency::new(budget.memory_bytes),
+            planner: opened.pipeline.scheduler.start(),
+            upload_bytes_per_frame: budget.upload_bytes_per_frame,
+            last: None,
+            frames: 0,
+        }
+    }
+
+    /// Loads what a frame needs: its near chunks, then what the scheduler plans.
+    fn load(&mut self, camera: &Camera, cell: Option<CellId>) -> Result<(), Fault> {
+        let (scene, opened) = (self.tour.scene, self.opened);
+        let fetch = |b: Block| opened.fetch(b);
+        self.residency.tick();
+        for c in opened.near(cell, camera).iter() {
+            let block = Block::Chunk(scene.chunks[c.index()].source);
+            self.residency.hold(self.device, block, false, 0, scene, &fetch)?;
+        }
+        let before = self.last.unwrap_or(*camera);
+        let motion = Motion {
+            time_s: self.frames as f64 / f64::from(self.tour.frames_per_s),
+            moved: before.eye.distance(camera.eye) as f32,
+            turned_rad: before.forward.angle_between(camera.forward),
+            eye: camera,
+            lights: &[],
+            future: self.tour.cameras.get(self.frames + 1..),
+        };
+        let wants = Wants { opened, residency: &self.residency };
+        let plan = self.planner.plan(&motion, &wants, self.residency.left_for_scheduler());
+        plan.evict.into_iter().for_each(|b| self.residency.release(self.device, b));
+        // At least one block a frame, or one that is larger than the limit would never come.
+        let mut left = self.upload_bytes_per_frame;
+        for block in plan.fetch {
+            if left == Some(0) {
+                break;
+            }
+            let before = self.residency.bytes;
+            let texels = opened.stored(block).map_or(0, |s| s.texture_bytes);
+            self.residency.hold(self.device, block, true, texels, scene, &fetch)?;
+            left = left.map(|l| l.saturating_sub(self.residency.bytes.saturating_sub(before)));
+        }
+        (self.last, self.frames) = (Some(*camera), self.frames + 1);
+        Ok(())
+    }
+
+    /// The next frame of the path.
+    ///
+    /// # Errors
+    /// What loading and drawing give.
+    pub fn step(&mut self, camera: &Camera) -> Result<Walked, Fault> {
+        let cell = self.opened.cell_of(camera);
+        self.load(camera, cell)?;
+        let residency = &self.residency;
+        let drawn = self.opened.draws(cell, camera, &|b| residency.has(b));
+        let list = frame(camera, drawn.draws, self.tour.shading);
+        let warm_up = if self.frames == 1 { self.tour.measure.warm_up } else { 0 };
+        for _ in 0..warm_up {
+            self.device.backend.render(&list)?;
+        }
+        let mut best = self.device.backend.render(&list)?;
+        let time = |c: &farfield_core::backend::Counted| c.gpu_ms.unwrap_or(c.wall_ms);
+        for _ in 1..self.tour.measure.repeats {
+            let again = self.device.backend.render(&list)?;
+            if time(&again) < time(&best) {
+                best = again;
+            }
+        }
+        Ok(Walked {
+            cell,
+            frame_ms: time(&best),
+            by_gpu: best.gpu_ms.is_some(),
+            near_triangles: best.near_triangles,
+            far_triangles: best.far_triangles,
+            missing: drawn.missing,
+            resident_bytes: self.residency.bytes,
+            texture_bytes: self.residency.texture_bytes,
+        })
+    }
+
+    /// The frame that was drawn last, read back.
+    ///
+    /// # Errors
+    /// What the backend gives.
+    pub fn read(&mut self) -> Result<Rendered, Fault> {
+        read(&mut *self.device.backend)
+    }
+
+    /// Audits the claims of all built cells at `views` held-out viewpoints over all of them: partition and far field.
+    ///
+    /// # Errors
+    /// What loading and drawing give.
+    pub fn audit(&mut self, views: usize, seed: u64) -> Result<Vec<Measured>, Fault> {
+        let (tour, opened) = (self.tour, self.opened);
+        let claims = |id: &CellId| !opened.claims(*id).is_empty() || !opened.built.cells[id].cell.claims.is_empty();
+        let cells: Vec<CellId> = opened.built.cells.keys().copied().filter(claims).collect();
+        let each = views.div_ceil(cells.len().max(1));
+        let mut out = vec![];
+        if cells.is_empty() || views == 0 {
+            return Ok(out);
+        }
+        let fetch = |b: Block| opened.fetch(b);
+        for id in tour.scene.mesh_chunk_ids() {
+            self.device.load(Block::Chunk(id), tour.scene, &fetch)?;
+        }
+        for id in cells {
+            let payloads = opened.payloads(id);
+            for &b in &payloads {
+                self.device.load(b, tour.scene, &fetch)?;
+            }
+            let draws = |c: &Camera| opened.far_draws(id, c);
+            let audit = CellAudit {
+                scene: tour.scene,
+                views: tour.views,
+                cell: &opened.built.cells[&id].cell,
+                asset: asset_of(id),
+                claims: opened.claims(id),
+                draws: &draws,
+            };
+            out.extend(audit.sample(&mut *self.device.backend, each, seed)?);
+            for b in payloads.into_iter().filter(|&b| !self.residency.has(b)) {
+                self.device.free(b);
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// The frame that a backend drew last, read back.
+///
+/// # Errors
+/// What the backend gives.
+pub fn read(backend: &mut dyn Backend) -> Result<Rendered, Fault> {
+    Ok(Rendered { picture: backend.read_picture(PICTURE)?, surface: backend.read_surface(SURFACE)? })
+}

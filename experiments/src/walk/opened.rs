@@ -1,0 +1,230 @@
+//! A built pipeline, opened for drawing: its far views, and the draws of a frame.
+
+use std::collections::BTreeMap;
+
+use farfield_core::cell::{Active, Cell};
+use farfield_core::claim::Claim;
+use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind, Shading};
+use farfield_core::id::{AssetId, Block, CellId, PayloadRef, TargetId};
+use farfield_core::payload::Payload;
+use farfield_core::scene::{ChunkSet, Scene};
+use farfield_core::strategy::{Achieved, Candidate, Covers, Demand, DrawBudget, FarView, View};
+use farfield_core::{Aabb, Camera, Fault};
+
+use super::residency::Residency;
+use crate::build::{Built, BuiltCell, Division};
+use crate::config::Pipeline;
+use crate::failure::Failure;
+use crate::store::{Manifest, Store, Stored, decode};
+
+/// The asset of the scene; those of cells follow.
+const SHARED: AssetId = AssetId(0);
+/// Where frames are drawn.
+pub(super) const SURFACE: TargetId = TargetId(0);
+/// Where they are lit.
+pub(super) const PICTURE: TargetId = TargetId(1);
+
+/// The asset of a cell.
+pub(super) fn asset_of(cell: CellId) -> AssetId {
+    AssetId(cell.0 + 1)
+}
+
+/// A pipeline ready to draw.
+pub struct Opened<'a> {
+    /// Its settings.
+    pub pipeline: &'a Pipeline,
+    /// Its cells.
+    pub division: &'a Division,
+    /// What was built.
+    pub built: &'a Built,
+    scene: &'a Scene,
+    store: &'a Store,
+    views: BTreeMap<CellId, Box<dyn FarView>>,
+}
+
+/// What a frame draws.
+pub struct Drawn {
+    /// The cell that served it.
+    pub cell: Option<CellId>,
+    /// The draws of its surface pass.
+    pub draws: Vec<Draw>,
+    /// Blocks that it missed.
+    pub missing: u32,
+}
+
+impl<'a> Opened<'a> {
+    /// Opens what was built.
+    ///
+    /// # Errors
+    /// What the far field says of the stored bytes.
+    pub fn new(
+        pipeline: &'a Pipeline,
+        division: &'a Division,
+        built: &'a Built,
+        scene: &'a Scene,
+        store: &'a Store,
+    ) -> Result<Self, Failure> {
+        let mut views = BTreeMap::new();
+        let shared = built.shared.as_ref().map(|m| (SHARED, m.index.as_slice()));
+        for (&id, cell) in &built.cells {
+            let view = pipeline.far_field.open(shared, (asset_of(id), &cell.manifest.index));
+            let failed = |f| Failure::during(format!("pipeline \"{}\": opening cell {}", pipeline.name, id.0), f);
+            views.insert(id, view.map_err(failed)?);
+        }
+        Ok(Self { pipeline, division, built, scene, store, views })
+    }
+
+    /// The built cell that serves a camera.
+    pub fn cell_of(&self, camera: &Camera) -> Option<CellId> {
+        self.division.cells.find(camera).filter(|id| self.built.cells.contains_key(id))
+    }
+
+    /// What is stored of a payload block.
+    pub fn stored(&self, block: Block) -> Option<&Stored> {
+        let Block::Payload(p) = block else { return None };
+        let manifest: &Manifest = if p.asset == SHARED {
+            self.built.shared.as_ref()?
+        } else {
+            &self.built.cells.get(&CellId(p.asset.0 - 1))?.manifest
+        };
+        manifest.payloads.get(&p.id)
+    }
+
+    /// A payload from the store.
+    ///
+    /// # Errors
+    /// [`Fault::Data`] where it is not there or not what was written.
+    pub fn fetch(&self, block: Block) -> Result<Payload, Fault> {
+        let gone = || Fault::Data { place: format!("{block:?}"), cause: "it is not in the store".into() };
+        decode(&self.store.get(&self.stored(block).ok_or_else(gone)?.key).ok_or_else(gone)?)
+    }
+
+    /// Every payload block of a cell, its scene's asset included.
+    pub fn payloads(&self, cell: CellId) -> Vec<Block> {
+        let of = |asset: AssetId, m: &Manifest| -> Vec<Block> {
+            m.payloads.keys().map(|&id| Block::Payload(PayloadRef { asset, id })).collect()
+        };
+        let shared = self.built.shared.iter().flat_map(|m| of(SHARED, m));
+        shared.chain(self.built.cells.get(&cell).into_iter().flat_map(|c| of(asset_of(cell), &c.manifest))).collect()
+    }
+
+    /// What the far field claims of a cell.
+    pub fn claims(&self, cell: CellId) -> &[Claim] {
+        self.built.cells.get(&cell).map_or(&[], |c| &c.manifest.claims)
+    }
+
+    fn with_view<R>(
+        &self,
+        id: CellId,
+        camera: &Camera,
+        f: impl FnOnce(&dyn FarView, &View<'_>, &Cell) -> R,
+    ) -> Option<R> {
+        let (BuiltCell { cell, .. }, far) = (self.built.cells.get(&id)?, self.views.get(&id)?);
+        let at: Active = self.division.cells.active(cell, camera);
+        // Half a pixel, at a box's nearest point: tolerance = distance / (2 px_per_tan).
+        let half_px = |b: &Aabb| 0.5 * b.distance(camera.eye.as_vec3()) / camera.px_per_tan();
+        let view = View {
+            scene: self.scene,
+            camera,
+            at: &at,
+            tolerance: &half_px,
+            budget: DrawBudget::default(),
+            cell: Some(cell),
+        };
+        Some(f(&**far, &view, cell))
+    }
+
+    /// The near chunks that a frame draws beside its far field, culled to the camera; all that it may see where the camera
+    /// is in no cell.
+    pub fn near(&self, cell: Option<CellId>, camera: &Camera) -> ChunkSet {
+        let scene = self.scene;
+        let near = cell.and_then(|id| {
+            self.with_view(id, camera, |_, view, cell| match self.built.covers {
+                Covers::Everything => ChunkSet::default(),
+                Covers::Far => cell.splits[view.at.split.index()].far.complement(scene.chunks.len() as u32),
+            })
+        });
+        scene.cull(&near.unwrap_or_else(|| scene.all_chunks()), camera)
+    }
+
+    /// The draws of a frame, of blocks that are `resident`.
+    pub fn draws(&self, cell: Option<CellId>, camera: &Camera, resident: &dyn Fn(Block) -> bool) -> Drawn {
+        let near = self.near(cell, camera);
+        let there: ChunkSet =
+            near.iter().filter(|c| resident(Block::Chunk(self.scene.chunks[c.index()].source))).collect();
+        let mut missing = (near.len() - there.len()) as u32;
+        let mut draws = vec![];
+        if !there.is_empty() {
+            draws.push(Draw { what: DrawWhat::Chunks(there), bounds: self.scene.bounds, error_px: 0.0 });
+        }
+        if let Some(id) = cell {
+            let achieved = self.with_view(id, camera, |far, view, _| far.draw(resident, view, &mut draws));
+            missing += achieved.unwrap_or(Achieved::default()).missing;
+        }
+        Drawn { cell, draws, missing }
+    }
+
+    /// What a cell's far field alone draws, all of it resident.
+    pub fn far_draws(&self, cell: CellId, camera: &Camera) -> Vec<Draw> {
+        let mut draws = vec![];
+        self.with_view(cell, camera, |far, view, _| far.draw(&|_| true, view, &mut draws));
+        draws
+    }
+
+    /// Original triangles over triangles that a cell draws, not culled to any frustum; 0 where nothing is simplified.
+    pub fn original_over_simplified(&self, cell: CellId) -> f64 {
+        let Some(BuiltCell { cell, manifest }) = self.built.cells.get(&cell) else { return 0.0 };
+        let all = self.scene.triangles();
+        let far = self.scene.triangles_of(&cell.splits[0].far);
+        let simplified = manifest.triangles();
+        if self.built.covers == Covers::Everything || manifest.payloads.is_empty() {
+            return 0.0;
+        }
+        all as f64 / (all - far + simplified).max(1) as f64
+    }
+}
+
+/// A frame as two passes: what is seen, then light.
+pub fn frame(camera: &Camera, draws: Vec<Draw>, shading: &Shading) -> DrawList {
+    let shade = PassKind::Shade { surface: SURFACE, shading: shading.clone() };
+    DrawList {
+        passes: vec![
+            Pass { kind: PassKind::Surface, camera: *camera, writes: SURFACE, draws },
+            Pass { kind: shade, camera: *camera, writes: PICTURE, draws: vec![] },
+        ],
+    }
+}
+
+/// What far fields want, for schedulers.
+pub(super) struct Wants<'a> {
+    /// The pipeline.
+    pub(super) opened: &'a Opened<'a>,
+    /// What is held.
+    pub(super) residency: &'a Residency,
+}
+
+impl Demand for Wants<'_> {
+    fn near(&self, eye: &Camera, radius: f32) -> Vec<CellId> {
+        let here = self.opened.cell_of(eye);
+        let at = Aabb::of([eye.eye.as_vec3()]);
+        let outlines = self.opened.division.cells.outlines();
+        let mut near: Vec<(bool, f32, CellId)> = self
+            .opened
+            .built
+            .cells
+            .keys()
+            .map(|&id| (Some(id) != here, outlines[id.index()].region.distance(&at), id))
+            .filter(|(elsewhere, d, _)| !elsewhere || *d <= radius)
+            .collect();
+        near.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        near.into_iter().map(|n| n.2).collect()
+    }
+
+    fn of(&self, cell: CellId, from: &Camera, out: &mut Vec<Candidate>) {
+        self.opened.with_view(cell, from, |far, view, _| far.wanted(view, out));
+    }
+
+    fn resident(&self, block: Block) -> bool {
+        self.residency.has(block)
+    }
+}
