@@ -107,7 +107,7 @@ fn examine(instance: &Instance, physical: vk::PhysicalDevice) -> Result<(u32, Ca
     // SAFETY: as above.
     let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }.unwrap_or_default();
     let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
-    if !core_1_3 && !(has(khr::dynamic_rendering::NAME) && has(khr::synchronization2::NAME)) {
+    if !(core_1_3 || has(khr::dynamic_rendering::NAME) && has(khr::synchronization2::NAME)) {
         return refuse("it has neither Vulkan 1.3 nor VK_KHR_dynamic_rendering with VK_KHR_synchronization2");
     }
     let mut rendering = vk::PhysicalDeviceDynamicRenderingFeatures::default();
