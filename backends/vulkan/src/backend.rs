@@ -15,6 +15,7 @@ use farfield_shaders::plan::{FramePlan, Limits, Work, Written, plan};
 use farfield_shaders::records::SceneTable;
 
 use crate::blocks::Blocks;
+use crate::choose::Without;
 use crate::frame::{Frames, Target};
 use crate::gpu::Gpu;
 use crate::instance::Journal;
@@ -35,6 +36,8 @@ pub struct Options {
     pub validation: bool,
     /// Take only a device whose name, "device, driver", holds this; case does not matter.
     pub device: Option<String>,
+    /// Optional features that are treated as if the device lacked them: a way to try the fallbacks.
+    pub without: Without,
 }
 
 /// Draws on a Vulkan device.
@@ -60,7 +63,7 @@ pub struct VulkanBackend {
 /// # Errors
 /// [`Fault::Device`] that says why there is none: no loader, no driver, or what each device lacks.
 pub fn available() -> Result<String, Fault> {
-    Ok(Gpu::open(false, None)?.caps.name.clone())
+    Ok(Gpu::open(false, None, Without::default())?.caps.name.clone())
 }
 
 impl VulkanBackend {
@@ -70,7 +73,7 @@ impl VulkanBackend {
     /// [`Fault::Device`] where there is no loader, no driver, no device that serves, or validation is asked for and not
     /// installed; [`Fault::Data`] naming a texture that is unsound or too large for the device.
     pub fn new(scene: &Scene, options: Options) -> Result<Self, Fault> {
-        let gpu = Arc::new(Gpu::open(options.validation, options.device.as_deref())?);
+        let gpu = Arc::new(Gpu::open(options.validation, options.device.as_deref(), options.without)?);
         let info =
             DeviceInfo { backend: "vulkan".into(), device: gpu.caps.name.clone(), degraded: gpu.caps.degraded.clone() };
         let mut by = Submitter::new(&gpu)?;

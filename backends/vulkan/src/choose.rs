@@ -11,6 +11,9 @@ use farfield_core::Fault;
 
 use crate::instance::{Instance, no_device};
 
+/// Sub-pixel precision that is not worth a word: what GPUs and lavapipe have; Vulkan asks for 4 bits only.
+const GOOD_SUB_PIXEL_BITS: u32 = 8;
+
 /// What the device promises of accesses out of range, as wgpu-hal 30 asks for it, so that both stacks run the same shaders.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Robustness {
@@ -56,18 +59,29 @@ pub(crate) struct Caps {
     pub(crate) degraded: Vec<String>,
 }
 
-/// The best device whose name holds `filter` (case does not matter).
+/// Optional features to leave unused.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Without {
+    /// Draws go one by one.
+    pub indirect: bool,
+    /// No time on the device is measured.
+    pub timestamps: bool,
+    /// No primitives are counted.
+    pub statistics: bool,
+}
+
+/// The best device whose name holds `filter` (case does not matter), used without the features of `without`.
 ///
 /// # Errors
 /// [`Fault::Device`] that lists the devices there are and why each does not serve.
-pub(crate) fn choose(instance: &Instance, filter: Option<&str>) -> Result<Caps, Fault> {
+pub(crate) fn choose(instance: &Instance, filter: Option<&str>, without: Without) -> Result<Caps, Fault> {
     // SAFETY: the instance is alive.
     let all = unsafe { instance.raw.enumerate_physical_devices() }
         .map_err(|e| no_device(format!("the devices cannot be listed: {e}")))?;
     let mut refused = vec![];
     let mut fit = vec![];
     for physical in all {
-        match examine(instance, physical) {
+        match examine(instance, physical, without) {
             Ok((rank, caps)) if filter.is_none_or(|f| caps.name.to_lowercase().contains(&f.to_lowercase())) => {
                 fit.push((rank, caps));
             }
@@ -83,7 +97,7 @@ pub(crate) fn choose(instance: &Instance, filter: Option<&str>) -> Result<Caps, 
     })
 }
 
-fn examine(instance: &Instance, physical: vk::PhysicalDevice) -> Result<(u32, Caps), String> {
+fn examine(instance: &Instance, physical: vk::PhysicalDevice, without: Without) -> Result<(u32, Caps), String> {
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut most = vk::PhysicalDeviceMaintenance3Properties::default();
     let mut two = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut most);
@@ -135,9 +149,9 @@ fn examine(instance: &Instance, physical: vk::PhysicalDevice) -> Result<(u32, Ca
     }
 
     let on = |v: vk::Bool32| v == vk::TRUE;
-    let timestamp_bits = families[family].timestamp_valid_bits;
-    let statistics = on(f.pipeline_statistics_query);
-    let multi_draw = on(f.multi_draw_indirect) && on(f.draw_indirect_first_instance);
+    let timestamp_bits = if without.timestamps { 0 } else { families[family].timestamp_valid_bits };
+    let statistics = on(f.pipeline_statistics_query) && !without.statistics;
+    let multi_draw = on(f.multi_draw_indirect) && on(f.draw_indirect_first_instance) && !without.indirect;
     let mut degraded = vec![];
     let mut lacks = |there: bool, words: &str| {
         if !there {
@@ -152,6 +166,14 @@ fn examine(instance: &Instance, physical: vk::PhysicalDevice) -> Result<(u32, Ca
         two: has_two.then(|| [on(two.robust_buffer_access2), on(two.robust_image_access2)]),
         image: on(image.robust_image_access).then_some(!core_1_3),
     };
+    let bits = properties.limits.sub_pixel_precision_bits;
+    if bits < GOOD_SUB_PIXEL_BITS {
+        // A corner is moved by up to half a step in each direction.
+        let px = 0.5_f64.powi(bits as i32 + 1);
+        degraded.push(format!(
+            "{bits} bits of sub-pixel precision: corners move by up to {px} px, what they span with them"
+        ));
+    }
     let rank = match properties.device_type {
         vk::PhysicalDeviceType::DISCRETE_GPU => 0,
         vk::PhysicalDeviceType::INTEGRATED_GPU => 1,

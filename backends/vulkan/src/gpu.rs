@@ -9,7 +9,7 @@ use ash::{ext, khr, vk};
 use farfield_core::Fault;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
-use crate::choose::{Caps, choose};
+use crate::choose::{Caps, Without, choose};
 use crate::instance::{Instance, no_device};
 
 /// Owns the device and its instance.
@@ -31,9 +31,9 @@ impl Gpu {
     ///
     /// # Errors
     /// [`Fault::Device`] where there is none that serves, or it refuses.
-    pub(crate) fn open(validation: bool, filter: Option<&str>) -> Result<Self, Fault> {
+    pub(crate) fn open(validation: bool, filter: Option<&str>, without: Without) -> Result<Self, Fault> {
         let instance = Instance::new(validation)?;
-        let caps = choose(&instance, filter)?;
+        let caps = choose(&instance, filter, without)?;
         let refused = |e: vk::Result| Fault::Device { device: caps.name.clone(), cause: format!("does not open: {e}") };
 
         let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(caps.family).queue_priorities(&[1.0])];
@@ -161,7 +161,7 @@ mod tests {
 
     /// What validation says of `misuse`; `None` (a visible skip) without a device or the layer.
     fn said_of(misuse: impl FnOnce(&Arc<Gpu>)) -> Option<Vec<String>> {
-        match Gpu::open(true, None) {
+        match Gpu::open(true, None, Without::default()) {
             Ok(gpu) => {
                 let (journal, gpu) = (gpu.instance.journal.clone(), Arc::new(gpu));
                 misuse(&gpu);

@@ -31,4 +31,5 @@ mod targets;
 mod textures;
 
 pub use backend::{Options, VulkanBackend, available};
+pub use choose::Without;
 pub use instance::Journal;

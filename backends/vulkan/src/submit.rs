@@ -11,10 +11,6 @@ use farfield_core::Fault;
 use crate::gpu::Gpu;
 use crate::record::Recorder;
 
-/// The longest that a submission may take, nanoseconds: a software device needs seconds for billions of triangles, a
-/// device that hangs must not hang its caller for ever.
-const PATIENCE_NS: u64 = 600_000_000_000;
-
 /// Records and submits.
 pub(crate) struct Submitter {
     gpu: Arc<Gpu>,
@@ -63,6 +59,7 @@ impl Submitter {
         let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.buffer)];
         let submits = [vk::SubmitInfo2::default().command_buffer_infos(&buffers)];
         let fences = [self.fence];
+        // A driver ends the wait for a device that hangs by calling it lost; to give up sooner would leave work under way.
         // SAFETY: the buffer is recording and is ended before it is submitted; the fence is unsignalled and waited for
         // before its next use; all the buffer refers to is held by the caller of this function until it returns.
         let done = unsafe {
@@ -70,7 +67,7 @@ impl Submitter {
                 .end_command_buffer(self.buffer)
                 .and_then(|()| gpu.raw.reset_fences(&fences))
                 .and_then(|()| (gpu.submit)(gpu.queue, 1, submits.as_ptr(), self.fence).result())
-                .and_then(|()| gpu.raw.wait_for_fences(&fences, true, PATIENCE_NS))
+                .and_then(|()| gpu.raw.wait_for_fences(&fences, true, u64::MAX))
         };
         done.map_err(|e| gpu.fault("submitting", e))
     }

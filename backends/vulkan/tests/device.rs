@@ -8,12 +8,16 @@ use farfield_core::mesh::TriangleMesh;
 use farfield_core::payload::{AtlasPart, Part, Payload};
 use farfield_core::scene::{ChunkSet, Light, LightKind, Material, Placement, Scene, SceneBuilder, Texture};
 use farfield_core::{Aabb, Camera, Fault};
-use farfield_vulkan::{Options, VulkanBackend, available};
+use farfield_vulkan::{Options, VulkanBackend, Without, available};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 /// A backend under validation, or a skip that says why.
 fn opened(test: &str, scene: &Scene) -> Option<VulkanBackend> {
-    match VulkanBackend::new(scene, Options { validation: true, device: None }) {
+    opened_without(test, scene, Without::default())
+}
+
+fn opened_without(test: &str, scene: &Scene, without: Without) -> Option<VulkanBackend> {
+    match VulkanBackend::new(scene, Options { validation: true, without, ..Options::default() }) {
         Ok(backend) => Some(backend),
         Err(why) if std::env::var_os("FARFIELD_EXPECT_DEVICE").is_some_and(|v| v == "1") => panic!("{test}: {why}"),
         Err(why) => {
@@ -124,6 +128,29 @@ fn a_frame_is_counted_and_timed() {
 }
 
 #[test]
+fn a_device_that_lacks_something_does_the_same_and_says_so() {
+    const TEST: &str = "a_device_that_lacks_something_does_the_same_and_says_so";
+    let scene = scene(60, 5);
+    let list = frame(&scene, scene.all_chunks(), camera(&scene, [200, 150]));
+    let shown = |backend: &mut VulkanBackend| {
+        upload_scene(backend, &scene).unwrap();
+        let counted = backend.render(&list).unwrap();
+        (counted, backend.read_surface(TargetId(0)).unwrap(), backend.read_picture(TargetId(1)).unwrap())
+    };
+    let Some(mut whole) = opened(TEST, &scene) else { return };
+    let without = Without { indirect: true, timestamps: true, statistics: true };
+    let Some(mut bare) = opened_without(TEST, &scene, without) else { return };
+    let (a, b) = (shown(&mut whole), shown(&mut bare));
+    assert_eq!((&a.1, &a.2), (&b.1, &b.2));
+    assert_eq!((b.0.gpu_ms, b.0.clipped_primitives, b.0.near_triangles), (None, None, a.0.near_triangles));
+    for what in ["timestamps", "statistics", "multi-draw-indirect"] {
+        assert!(bare.info().degraded.iter().any(|d| d.contains(what)), "{what}: {:?}", bare.info().degraded);
+    }
+    ends_silently(whole);
+    ends_silently(bare);
+}
+
+#[test]
 fn targets_change_their_size_within_a_frame_and_between_frames() {
     let scene = scene(20, 2);
     let Some(mut backend) = opened("targets_change_their_size_within_a_frame_and_between_frames", &scene) else {
@@ -165,7 +192,7 @@ fn what_the_device_cannot_hold_is_refused_and_leaves_it_working() {
 fn a_device_that_is_not_there_is_named_with_those_that_are() {
     let scene = scene(4, 1);
     let Ok(name) = available() else { return drop(opened("a_device_that_is_not_there_is_named", &scene)) };
-    let options = Options { validation: false, device: Some("abacus".into()) };
+    let options = Options { device: Some("abacus".into()), ..Options::default() };
     let Err(fault) = VulkanBackend::new(&scene, options) else { panic!("an abacus was found") };
     let text = fault.to_string();
     assert!(text.contains("abacus") && text.contains(&name), "{text}");
