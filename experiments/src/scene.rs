@@ -101,7 +101,10 @@ fn placed(
 ) -> Result<Scene, farfield_core::Fault> {
     let mut builder = SceneBuilder::default();
     (builder.materials, builder.textures) = (materials, textures);
-    let ids = park.meshes.into_iter().map(|(name, mesh)| builder.mesh(name, mesh)).collect::<Result<Vec<_>, _>>()?;
+    let mut ids = vec![];
+    for (name, mesh) in park.meshes {
+        ids.push(builder.mesh(name, sectioned(mesh))?);
+    }
     for p in &park.placements {
         builder.place(Placement { mesh: ids[p.kind as usize], transform: to_world * transform(p) });
     }
@@ -122,7 +125,8 @@ pub fn generate_park(triangles: u64, seed: u64) -> Result<ParkScene, Failure> {
 /// What writing gives; a wrong format is [`Failure::Input`].
 pub fn write_park(file: &Path, park: ParkScene) -> Result<(), Failure> {
     let placements: Vec<(usize, DAffine3)> = park.placements.iter().map(|p| (p.kind as usize, transform(p))).collect();
-    let meshes: Vec<(String, TriangleMesh)> = park.meshes.into_iter().map(|(n, m)| (n.to_owned(), m)).collect();
+    let meshes: Vec<(String, TriangleMesh)> =
+        park.meshes.into_iter().map(|(n, m)| (n.to_owned(), sectioned(m))).collect();
     let materials = [statue(false)];
     let scene = Export { meshes: &meshes, placements: &placements, materials: &materials, textures: &[] };
     export(file, &scene).map_err(|e| match e {
@@ -134,6 +138,14 @@ pub fn write_park(file: &Path, park: ParkScene) -> Result<(), Failure> {
 /// Sculpted statues carry their colours in their vertices.
 fn statue(two_sided: bool) -> Material {
     Material { name: "statue".into(), base_color: [1.0; 4], texture: None, two_sided }
+}
+
+/// A sculpted mesh names no material: all of it is the first.
+fn sectioned(mut mesh: TriangleMesh) -> TriangleMesh {
+    if mesh.sections.is_empty() {
+        mesh.sections = vec![(0..mesh.indices.len() as u32, MaterialId(0))];
+    }
+    mesh
 }
 
 /// From a statue's mesh to the park.

@@ -31,7 +31,7 @@ fn what_is_put_comes_back_in_another_process_life() {
     let dir = tempfile::tempdir().unwrap();
     let name = key("test", &[b"a"]);
     assert_eq!(store(dir.path()).0.get(&name), None);
-    let bytes: Vec<u8> = (0..100_000u32).map(|i| (i * i >> 7) as u8).collect();
+    let bytes: Vec<u8> = (0..100_000u32).map(|i| (i.wrapping_mul(i) >> 7) as u8).collect();
     store(dir.path()).0.put(&name, &bytes).unwrap();
     assert_eq!(store(dir.path()).0.get(&name), Some(bytes));
 }
