@@ -89,7 +89,7 @@ pub fn validate(block: Block, data: &BlockData<'_>) -> Result<(), Fault> {
     let bad = |cause: String| Err(Fault::Data { place: format!("{block:?}"), cause });
     let indices = |ix: &[u32], n: usize| match ix.iter().find(|&&i| i as usize >= n) {
         Some(i) => bad(format!("index {i} of {n} vertices")),
-        None if ix.len() % 3 != 0 => bad(format!("{} indices are not whole triangles", ix.len())),
+        None if !ix.len().is_multiple_of(3) => bad(format!("{} indices are not whole triangles", ix.len())),
         None => Ok(()),
     };
     match data {

@@ -151,7 +151,7 @@ fn check(m: &TriangleMesh) -> Result<(), String> {
             return Err(format!("{len} {what} for {n} vertices"));
         }
     }
-    if m.indices.len() % 3 != 0 {
+    if !m.indices.len().is_multiple_of(3) {
         return Err(format!("{} indices are not whole triangles", m.indices.len()));
     }
     if let Some((i, v)) = m.indices.iter().enumerate().find(|&(_, &v)| v as usize >= n) {
@@ -162,7 +162,7 @@ fn check(m: &TriangleMesh) -> Result<(), String> {
     }
     let mut at = 0;
     for (r, _) in &m.sections {
-        if r.start != at || r.end < r.start || r.end % 3 != 0 {
+        if r.start != at || r.end < r.start || !r.end.is_multiple_of(3) {
             return Err(format!("sections do not join at index {at}"));
         }
         at = r.end;

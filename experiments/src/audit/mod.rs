@@ -1,11 +1,11 @@
 //! Audits: claims held against measurements at viewpoints that nothing was built from.
 //!
-//! For each quantity there is one measurement. A *hole width* is measured on one payload alone: the object's original
-//! geometry against the payload, both seen by a camera of the view model that stands at a random viewpoint of the cell and
+//! For each quantity there is one measurement. A *hole width* is measured on one object alone: its original far
+//! geometry against its payloads, both seen by a camera of the view model that stands at a random viewpoint of the cell and
 //! turns the object to a random place of its picture (so the stretch towards the picture's corners is in it). A pixel is
 //! the measurement's resolution: a slit of any width may catch one row of pixel centres, so that a violation is a measured
 //! width of more than the claim plus one pixel. *Near triangles* are counted by culling, with the four side planes, every
-//! placed chunk that the cell's split calls near. Samples can refute a bound, not prove it.
+//! placed chunk that the cell's first split calls near. Samples can refute a bound, not prove it.
 
 use std::collections::BTreeMap;
 
@@ -43,6 +43,13 @@ pub struct CellAudit<'a> {
     pub draws: &'a dyn Fn(&Camera) -> Vec<Draw>,
 }
 
+/// An object that is drawn from the cell's centre, with its box and the largest claim of its payloads.
+struct Object {
+    id: ObjectId,
+    bounds: Aabb,
+    claimed: f64,
+}
+
 /// One measurement beside what was claimed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
@@ -70,41 +77,52 @@ fn resolution(q: Quantity) -> f64 {
 }
 
 impl CellAudit<'_> {
-    /// Takes `n` measurements, shared out over the claims in turn. The same seed gives the same viewpoints.
+    /// Takes `n` measurements, shared out over what is claimed in turn. The same seed gives the same viewpoints.
     ///
     /// # Errors
     /// What the backend gives.
     pub fn sample(&self, backend: &mut dyn Backend, n: usize, seed: u64) -> Result<Vec<Measured>, Fault> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ u64::from(self.cell.outline.id.0).rotate_left(32));
-        let shown = self.shown();
-        let claims: Vec<&Claim> = self.cell.claims.iter().chain(self.claims).collect();
+        let whole = self.cell.claims.iter().filter(|c| c.payload.is_none());
+        let mut questions: Vec<(Quantity, f64, Option<Object>)> = whole.map(|c| (c.quantity, c.max, None)).collect();
+        questions.extend(self.objects().into_iter().map(|o| (Quantity::HoleWidthPx, o.claimed, Some(o))));
         let mut out = vec![];
-        for i in 0..n.min(n * claims.len()) {
-            let claim = claims[i % claims.len()];
-            let measured = match (claim.quantity, claim.payload.and_then(|p| shown.get(&p))) {
+        for i in 0..n.min(n * questions.len()) {
+            let (quantity, claimed, object) = &questions[i % questions.len()];
+            let measured = match (quantity, object) {
                 (Quantity::NearTriangles, _) => self.near_triangles(&mut rng),
-                (Quantity::HoleWidthPx, Some(&(object, bounds))) => {
-                    self.hole_width(backend, claim.payload, object, bounds, &mut rng)?
-                }
+                (Quantity::HoleWidthPx, Some(object)) => self.hole_width(backend, object, &mut rng)?,
                 (Quantity::HoleWidthPx, None) => None,
             };
-            out.extend(measured.map(|m| Measured { quantity: claim.quantity, claimed: claim.max, measured: m }));
+            out.extend(measured.map(|measured| Measured { quantity: *quantity, claimed: *claimed, measured }));
         }
         Ok(out)
     }
 
-    /// The payloads that are drawn from the cell's centre, with their object and box.
-    fn shown(&self) -> BTreeMap<LocalPayload, (ObjectId, Aabb)> {
+    /// The objects all of whose payloads claim a hole width: where one payload is silent, so is the object.
+    fn objects(&self) -> Vec<Object> {
         let cube = Camera::cube(self.cell.outline.centre.as_dvec3(), 16, self.views.near);
-        let draws = cube.iter().flat_map(|c| (self.draws)(c));
-        draws
-            .filter_map(|d| match d.what {
-                DrawWhat::Payload { id, object, .. } if id.asset == self.asset && object > 0 => {
-                    Some((id.id, (ObjectId(object - 1), d.bounds)))
-                }
-                _ => None,
-            })
-            .collect()
+        let claimed: BTreeMap<LocalPayload, f64> = self
+            .claims
+            .iter()
+            .filter(|c| c.quantity == Quantity::HoleWidthPx)
+            .filter_map(|c| Some((c.payload?, c.max)))
+            .collect();
+        let mut by: BTreeMap<u32, (Aabb, Option<f64>)> = BTreeMap::new();
+        for d in cube.iter().flat_map(|c| (self.draws)(c)) {
+            if let DrawWhat::Payload { id, object, .. } = d.what
+                && id.asset == self.asset
+                && object > 0
+            {
+                let (bounds, max) = by.entry(object - 1).or_insert((Aabb::EMPTY, Some(0.0)));
+                *bounds = bounds.union(d.bounds);
+                *max = max.and_then(|m| Some(m.max(*claimed.get(&id.id)?)));
+            }
+        }
+        let object = |(id, (bounds, claimed)): (u32, (Aabb, Option<f64>))| {
+            Some(Object { id: ObjectId(id), bounds, claimed: claimed? })
+        };
+        by.into_iter().filter_map(object).collect()
     }
 
     /// A camera of the view model at a random viewpoint, with `target` at a random place of its picture; the picture cut
@@ -119,22 +137,20 @@ impl CellAudit<'_> {
         crop(&self.views.camera(eye, yaw, pitch), &target)
     }
 
-    fn hole_width(
-        &self,
-        backend: &mut dyn Backend,
-        payload: Option<LocalPayload>,
-        object: ObjectId,
-        bounds: Aabb,
-        rng: &mut impl Rng,
-    ) -> Result<Option<f64>, Fault> {
-        let Some(camera) = self.aimed(bounds, rng) else { return Ok(None) };
-        let own = ChunkSet::from_range(self.scene.objects[object.index()].chunks.clone());
+    fn hole_width(&self, backend: &mut dyn Backend, o: &Object, rng: &mut impl Rng) -> Result<Option<f64>, Fault> {
+        let Some(camera) = self.aimed(o.bounds, rng) else { return Ok(None) };
+        let own = ChunkSet::from_range(self.scene.objects[o.id.index()].chunks.clone());
         let far = own.intersection(&self.cell.splits[0].far);
-        let reference = vec![Draw { what: DrawWhat::Chunks(far), bounds, error_px: 0.0 }];
-        let candidate: Vec<Draw> = (self.draws)(&camera)
-            .into_iter()
-            .filter(|d| matches!(d.what, DrawWhat::Payload { id, .. } if Some(id.id) == payload && id.asset == self.asset))
-            .collect();
+        let of_object = |mut d: Draw| {
+            match &mut d.what {
+                DrawWhat::Payload { object, .. } if *object != o.id.0 + 1 => return None,
+                DrawWhat::Payload { .. } => {}
+                DrawWhat::Chunks(set) => *set = set.intersection(&own),
+            }
+            Some(d)
+        };
+        let reference = vec![Draw { what: DrawWhat::Chunks(far), bounds: o.bounds, error_px: 0.0 }];
+        let candidate: Vec<Draw> = (self.draws)(&camera).into_iter().filter_map(of_object).collect();
         let pass = |writes, draws| Pass { kind: PassKind::Surface, camera, writes, draws };
         backend.render(&DrawList { passes: vec![pass(REFERENCE, reference), pass(CANDIDATE, candidate)] })?;
         let (r, c) = (backend.read_surface(REFERENCE)?, backend.read_surface(CANDIDATE)?);
