@@ -47,7 +47,7 @@ pub(crate) fn run(args: Args, cancel: &AtomicBool) -> Result<(), Failure> {
 }
 
 fn load(input: &Input) -> Result<Experiment, Failure> {
-    config::load(&input.file, &input.sets)
+    config::load(&input.file, &input.sets, &list::entries())
 }
 
 /// To standard output; a reader that has closed it has seen enough.

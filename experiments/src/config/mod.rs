@@ -13,7 +13,7 @@ mod settings;
 
 use std::path::Path;
 
-use farfield_core::registry::{Kind, Setting, SettingType};
+use farfield_core::registry::{Entry, Kind, Setting, SettingType};
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
@@ -29,14 +29,15 @@ pub const DEFAULT_SCHEDULER: &str = "load-on-entry";
 /// The partition of pipelines that name none.
 pub const DEFAULT_PARTITION: &str = "single-cell";
 
-/// Reads an experiment file.
+/// Reads an experiment file. `entries` are the strategies and backends that it may name: [`crate::list::entries`], and those of
+/// third parties beside them.
 ///
 /// # Errors
 /// [`Failure::Input`] where it cannot be read, or has mistakes: all of them.
-pub fn load(file: &Path, sets: &[String]) -> Result<Experiment, Failure> {
+pub fn load(file: &Path, sets: &[String], entries: &[Entry]) -> Result<Experiment, Failure> {
     let text = std::fs::read_to_string(file)
         .map_err(|e| Failure::input(format!("{}: cannot be read", file.display()), e.to_string()))?;
-    let mut out = parse(&file.display().to_string(), &text, sets, file.parent().unwrap_or(Path::new("")))?;
+    let mut out = parse(&file.display().to_string(), &text, sets, file.parent().unwrap_or(Path::new("")), entries)?;
     out.file = file.to_owned();
     Ok(out)
 }
@@ -45,7 +46,13 @@ pub fn load(file: &Path, sets: &[String]) -> Result<Experiment, Failure> {
 ///
 /// # Errors
 /// All mistakes.
-pub fn parse(name: &str, text: &str, sets: &[String], folder: &Path) -> Result<Experiment, Mistakes> {
+pub fn parse(
+    name: &str,
+    text: &str,
+    sets: &[String],
+    folder: &Path,
+    entries: &[Entry],
+) -> Result<Experiment, Mistakes> {
     let mut texts = vec![(name.to_owned(), text.to_owned())];
     texts.extend(sets.iter().map(|s| ("--set".to_owned(), s.clone())));
     let sources = Sources(texts);
@@ -64,8 +71,7 @@ pub fn parse(name: &str, text: &str, sets: &[String], folder: &Path) -> Result<E
     }
     overrides::sweep(&mut root, &names, &mut mistakes);
 
-    let entries = crate::list::entries();
-    let mut walk = Walk { entries: &entries, mistakes: &mut mistakes };
+    let mut walk = Walk { entries, mistakes: &mut mistakes };
     let mut resolved = Map::new();
     for e in root.entries().unwrap_or_default() {
         if e.key != "pipeline" && !names.contains(&e.key.as_str()) {

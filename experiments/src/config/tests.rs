@@ -28,7 +28,7 @@ far_field = { type = "textured-lod-mesh", edge_px = 4.5 }
 
 fn read(text: &str, sets: &[&str]) -> Result<Experiment, Mistakes> {
     let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
-    parse("park.toml", text, &sets, Path::new("/nowhere"))
+    parse("park.toml", text, &sets, Path::new("/nowhere"), &crate::list::entries())
 }
 
 /// Every mistake as `line:column message`.

@@ -1,11 +1,9 @@
 //! Builds that are killed resume, and leave the very bytes of a build that was not; threads and processes change nothing.
 
-mod common;
-
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use common::{Folder, tree};
+use crate::common::{Folder, tree};
 
 fn blocks(root: &Path) -> usize {
     let folder = root.join("blocks");

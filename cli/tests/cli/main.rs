@@ -1,0 +1,5 @@
+//! The command, run as its users run it.
+
+mod commands;
+mod common;
+mod resume;
