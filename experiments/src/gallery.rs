@@ -11,13 +11,19 @@ use crate::measure::FrameErrors;
 use crate::report::Shown;
 use crate::walk::References;
 
-/// The first of this many measured frames is shown; with n pictures the steps are counted so that n are.
+/// Chooses frames while a path is walked, without knowing how long it is.
 pub struct Gallery {
     pictures: usize,
-    /// By pipeline: the chosen frames, doubling the stride when there are too many.
-    chosen: BTreeMap<String, (usize, Vec<(usize, usize, Picture)>)>,
+    chosen: BTreeMap<String, Chosen>,
     worst: BTreeMap<String, (f64, usize, Picture)>,
     order: Vec<String>,
+}
+
+/// One pipeline's frames along the path; the stride doubles when there are too many.
+struct Chosen {
+    stride: usize,
+    /// Which of the measured frames, the frame's number, its picture.
+    kept: Vec<(usize, usize, Picture)>,
 }
 
 impl Gallery {
@@ -35,14 +41,14 @@ impl Gallery {
         if self.worst.get(pipeline).is_none_or(|w| db < w.0) {
             self.worst.insert(pipeline.to_owned(), (db, frame, picture.clone()));
         }
-        let (stride, kept) = self.chosen.entry(pipeline.to_owned()).or_insert((1, vec![]));
-        if self.pictures == 0 || nth % *stride != 0 {
+        let chosen = self.chosen.entry(pipeline.to_owned()).or_insert(Chosen { stride: 1, kept: vec![] });
+        if self.pictures == 0 || !nth.is_multiple_of(chosen.stride) {
             return;
         }
-        kept.push((nth, frame, picture));
-        if kept.len() > self.pictures {
-            *stride *= 2;
-            kept.retain(|k| k.0 % *stride == 0);
+        chosen.kept.push((nth, frame, picture));
+        if chosen.kept.len() > self.pictures {
+            chosen.stride *= 2;
+            chosen.kept.retain(|k| k.0.is_multiple_of(chosen.stride));
         }
     }
 
@@ -53,7 +59,8 @@ impl Gallery {
     pub fn finish(self, references: &References, folder: &Path) -> io::Result<Vec<Shown>> {
         let mut out: Vec<Shown> = vec![];
         for name in &self.order {
-            let along = self.chosen.get(name).into_iter().flat_map(|c| &c.1).map(|(_, f, p)| (*f, "along the path", p));
+            let along =
+                self.chosen.get(name).into_iter().flat_map(|c| &c.kept).map(|(_, f, p)| (*f, "along the path", p));
             let worst = self.worst.get(name).map(|(_, f, p)| (*f, "worst frame", p));
             for (frame, caption, picture) in along.chain(worst) {
                 if out.iter().any(|s| s.pipeline == *name && s.frame == frame) {

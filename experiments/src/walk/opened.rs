@@ -8,7 +8,7 @@ use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind, Shading};
 use farfield_core::id::{AssetId, Block, CellId, PayloadRef, TargetId};
 use farfield_core::payload::Payload;
 use farfield_core::scene::{ChunkSet, Scene};
-use farfield_core::strategy::{Achieved, Candidate, Covers, Demand, DrawBudget, FarView, View};
+use farfield_core::strategy::{Candidate, Covers, Demand, DrawBudget, FarView, View};
 use farfield_core::{Aabb, Camera, Fault};
 
 use super::residency::Residency;
@@ -159,7 +159,7 @@ impl<'a> Opened<'a> {
         }
         if let Some(id) = cell {
             let achieved = self.with_view(id, camera, |far, view, _| far.draw(resident, view, &mut draws));
-            missing += achieved.unwrap_or(Achieved::default()).missing;
+            missing += achieved.unwrap_or_default().missing;
         }
         Drawn { cell, draws, missing }
     }
