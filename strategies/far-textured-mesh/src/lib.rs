@@ -7,7 +7,8 @@
 //! sets (3.1.4), view-dependent projective texturing (3.2, done by backends from `ProjectedPart`).
 //!
 //! Deviations, each said where it is made: categories are measured in pixel footprints; "front-facing to the cell" is read as "to some
-//! corner"; partly hidden polygons are checked on the depth images; texels are dilated past outlines; albedo and normals are captured, not
+//! corner"; of an object with several views edges are measured and vertices weighed from the centre ([`Lengths`], [`Weigh`]: what is
+//! printed is a setting, and gives ten times the published counts at one cell); partly hidden polygons are checked on the depth images; texels are dilated past outlines; albedo and normals are captured, not
 //! lit colours, so that lights may move. Clustering and regional occlusion culling are not part of this crate yet.
 //!
 //! A cell costs O(n log n) for n far triangles, most of it in collapse, and its pictures. Limits: the region must not meet far
@@ -59,6 +60,12 @@ pub struct TexturedLodMesh {
     /// Which polygons of an object that fails the view test are kept.
     #[serde(default)]
     pub facing: Facing,
+    /// From where edges of an object that fails the view test are measured.
+    #[serde(default)]
+    pub lengths: Lengths,
+    /// Which pictures weigh the vertices of an object that fails the view test.
+    #[serde(default)]
+    pub weigh: Weigh,
     /// How depth steps are measured.
     #[serde(default)]
     pub depth: DepthMeasure,
@@ -121,6 +128,29 @@ pub struct TexturedLodMesh {
     #[serde(default = "defaults::atlas_px")]
     #[schemars(range(min = 64, max = 16384), extend("unit" = "px"))]
     pub atlas_px: u32,
+}
+
+/// "The projected length with respect to the cell" of the paper's MVMesh, which it does not define.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Lengths {
+    /// From the cell's centre, as for a single view: gives the published counts.
+    #[default]
+    Centre,
+    /// The longest from any corner of the cell: two to four times the triangles at one and two cells.
+    LongestCorner,
+}
+
+/// Whose weights count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Weigh {
+    /// Those of the picture from the cell's centre; the others say what they see. Gives the published counts.
+    #[default]
+    Centre,
+    /// The largest over all pictures, as printed: two to eight times the triangles at one and two cells, since a vertex that turns
+    /// away from any one of the views then weighs as much as a silhouette.
+    AllViews,
 }
 
 mod defaults {

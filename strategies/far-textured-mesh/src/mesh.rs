@@ -19,7 +19,7 @@ use farfield_core::strategy::{CellJob, MeshView, Subject, Verdict, VertexSeen};
 use farfield_core::{Camera, Fault};
 use glam::{DVec3, Vec3};
 
-use crate::TexturedLodMesh;
+use crate::{Lengths, TexturedLodMesh, Weigh};
 use crate::atlas::{Texels, texels};
 use crate::facing::{Eyes, Facing, faces_all, faces_some};
 use crate::object::{Piece, Welded, weld};
@@ -97,7 +97,10 @@ pub(crate) fn simplify(
             .filter_map(|eye| own.camera(&mesh, relative(eye), px_per_tan, job.views.near))
             .collect();
         views.extend(shoot(&mesh, piece, &cameras, cx)?);
-        Eyes::new(&corners, px_per_tan)
+        match own.lengths {
+            Lengths::Centre => Eyes::new(&[relative(outline.centre)], px_per_tan),
+            Lengths::LongestCorner => Eyes::new(&corners, px_per_tan),
+        }
     };
     cx.check()?;
 
@@ -114,7 +117,7 @@ pub(crate) fn simplify(
         .collect();
     let (steps, weights) = (own.steps(job.views.near), own.weights());
     let looks: Vec<_> = views.iter().map(|v| look(&mesh, v, &steps, &weights, own.visible_px)).collect();
-    let seen = combine(&mesh, &looks);
+    let seen = combine(&mesh, &looks, own.weigh == Weigh::AllViews);
     let (out, border_move) = reduce(own, &mesh, &keep, &seen, &eyes, !verdict.passes)?;
 
     let stretch = f64::from(job.views.half_diagonal_rad()).cos().powi(-2);
@@ -334,4 +337,34 @@ fn speck(mesh: &Welded, culled: &[bool], centre: DVec3, size: f32) -> Baked {
     };
     let views = vec![];
     Baked { origin: mesh.origin, parts: vec![(part, vec![0; 2])], views, hole_px: None, passes: true, error_px: 1.0, size_px: 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Flat;
+    impl Cost for Flat {
+        fn costs(&mut self, _mesh: &LiveMesh, edges: &[[u32; 2]], out: &mut [Candidate]) {
+            for (e, o) in edges.iter().zip(out) {
+                let place = if e[1] == 3 { Place::At(Vec3::ZERO) } else { Place::First };
+                *o = Candidate { cost: 1.0, place };
+            }
+        }
+    }
+
+    #[test]
+    fn with_several_views_only_vertices_that_some_view_sees_together_or_none_sees_are_joined() {
+        let seen = [0b01, 0b11, 0b10, 0b11, 0, 0].map(|views| VertexSeen { views, ..VertexSeen::default() });
+        let live = LiveMesh::new(&[Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE, -Vec3::X], &[0, 1, 2], &[]).unwrap();
+        let edges = [[0, 1], [0, 2], [1, 2], [0, 4], [4, 5], [1, 3]];
+        let allowed = |several_views: bool| {
+            let mut out = [Candidate::FORBIDDEN; 6];
+            Constrained { inner: Box::new(Flat), seen: &seen, several_views }.costs(&live, &edges, &mut out);
+            out.map(|c| c.cost.is_finite())
+        };
+        assert_eq!(allowed(true), [true, false, true, false, true, false]);
+        // One view: nothing but new positions is refused.
+        assert_eq!(allowed(false), [true, true, true, true, true, false]);
+    }
 }

@@ -22,7 +22,8 @@ pub(crate) struct Piece {
     pub(crate) bounds: Aabb,
 }
 
-/// A welded piece. Triangles are counter-clockwise seen from in front, whatever the object's transform.
+/// A welded piece. Triangles are counter-clockwise seen from in front as they are placed: a transform that mirrors turns them
+/// inside out, as backends draw them.
 #[derive(Debug, Default)]
 pub(crate) struct Welded {
     /// Where positions start from, local frame.
@@ -62,7 +63,6 @@ pub(crate) fn weld(scene: &Scene, piece: &Piece) -> Result<Welded, Fault> {
     let names = scene.meshes[object.mesh.index()].vertex_ids as usize;
     let origin = piece.bounds.centre().as_dvec3();
     let to_piece = DAffine3::from_translation(-origin) * object.placement;
-    let mirrored = object.placement.matrix3.determinant() < 0.0;
     let turn = normal_matrix(&object.placement.matrix3);
     let mut out = Welded { origin, ..Welded::default() };
     let mut local = vec![u32::MAX; names];
@@ -81,7 +81,7 @@ pub(crate) fn weld(scene: &Scene, piece: &Piece) -> Result<Welded, Fault> {
             }
             for t in chunk.indices.chunks_exact(3) {
                 let [a, b, c] = [0, 1, 2].map(|k| local[chunk.vertex_ids[t[k] as usize] as usize]);
-                out.triangles.push(if mirrored { [a, c, b] } else { [a, b, c] });
+                out.triangles.push([a, b, c]);
                 out.two_sided.push(material.two_sided);
             }
         })?;

@@ -94,15 +94,109 @@ pub(crate) fn look(piece: &Welded, view: &Picture, steps: &Steps, weights: &Weig
         .collect()
 }
 
-/// Weights and view sets over all views, in their order.
-pub(crate) fn combine(piece: &Welded, looks: &[Vec<(f32, bool)>]) -> Vec<VertexSeen> {
+/// View sets over all views, in their order, and the largest weights over all of them or those of the first.
+pub(crate) fn combine(piece: &Welded, looks: &[Vec<(f32, bool)>], all_weigh: bool) -> Vec<VertexSeen> {
     let mut out: Vec<VertexSeen> =
         piece.locked.iter().map(|&locked| VertexSeen { weight: 0.0, views: 0, locked }).collect();
     for (i, view) in looks.iter().enumerate() {
         for (vertex, &(weight, seen)) in out.iter_mut().zip(view) {
-            vertex.weight = vertex.weight.max(weight);
+            if i == 0 || all_weigh {
+                vertex.weight = vertex.weight.max(weight);
+            }
             vertex.views |= u32::from(seen) << i;
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::category::DepthMeasure;
+    use crate::polygon::{shown, view_set};
+
+    const STEPS: Steps = Steps { measure: DepthMeasure::Footprint, c0: 4.0, c1: 1.0, near: 0.1 };
+    const WEIGHTS: Weights =
+        Weights { exterior: 0.5, interior_silhouette: 0.4, sharp: 0.25, interior: 0.125, back: 0.45, hidden: 0.05 };
+
+    /// A view along -z from (x, 0, 10) of a wall at z = 0 for |x|, |y| < 3 and a plate at z = 4 for |x|, |y| < 0.5.
+    fn picture(x: f32) -> Picture {
+        let eye = Vec3::new(x, 0.0, 10.0);
+        let camera = Camera::looking(eye.as_dvec3(), -Vec3::Z, Vec3::Y, 1.0, [200, 200], 0.1);
+        let mut image = SurfaceImage { size: [200, 200], ..SurfaceImage::default() };
+        for i in 0..200 * 200 {
+            let ray = camera.ray((i % 200) as f32 + 0.5, (i / 200) as f32 + 0.5);
+            let within = |z: f32, r: f32| {
+                let p = eye + ray * (10.0 - z);
+                (p.x.abs().max(p.y.abs()) < r).then_some(10.0 - z)
+            };
+            let depth = within(4.0, 0.5).or(within(0.0, 3.0)).unwrap_or(f32::INFINITY);
+            image.depth.push(depth);
+            image.object.push(u32::from(depth.is_finite()));
+            image.albedo.push([0; 4]);
+            image.normal.push(0);
+        }
+        Picture { camera, offset: -eye, eye: eye.as_dvec3(), image }
+    }
+
+    /// One triangle a place, facing +z (or -z), all its corners within a hundredth.
+    fn specks(at: &[(Vec3, bool)]) -> Welded {
+        let mut out = Welded::default();
+        for (i, &(p, front)) in at.iter().enumerate() {
+            let n = 3 * i as u32;
+            let (a, b) = if front { (n + 1, n + 2) } else { (n + 2, n + 1) };
+            out.positions.extend([p, p + Vec3::X * 0.01, p + Vec3::Y * 0.01]);
+            out.triangles.push([n, a, b]);
+            out.two_sided.push(false);
+            out.locked.extend([i == 0; 3]);
+        }
+        out
+    }
+
+    #[test]
+    fn vertices_weigh_what_their_pixel_is_or_that_they_are_hidden_or_turned_away() {
+        let at = [
+            (Vec3::new(1.8, 1.2, 0.0), true),    // in the middle of the wall
+            (Vec3::new(0.3, 0.0, 0.0), true),    // behind the plate
+            (Vec3::new(0.0, 0.48, 4.0), true),   // at the plate's edge, before the wall
+            (Vec3::new(-2.99, 0.0, 0.0), true),  // at the wall's edge
+            (Vec3::new(1.8, 1.2, 0.0), false),   // turned away
+        ];
+        let piece = specks(&at);
+        let centre = look(&piece, &picture(0.0), &STEPS, &WEIGHTS, 2.0);
+        let first: Vec<(f32, bool)> = centre.iter().step_by(3).copied().collect();
+        assert_eq!(first, [(0.125, true), (0.05, false), (0.4, true), (0.5, true), (0.45, false)]);
+
+        // From far to the side the spot behind the plate is seen.
+        let side = look(&piece, &picture(3.0), &STEPS, &WEIGHTS, 2.0);
+        assert!(side[3].1);
+        let both = [centre, side];
+        let seen = combine(&piece, &both, true);
+        assert_eq!((seen[0].views, seen[3].views, seen[12].views), (0b11, 0b10, 0));
+        assert_eq!((seen[3].weight, seen[12].weight), (0.125, 0.45));
+        assert!(seen[0].locked && !seen[3].locked);
+        assert_eq!(combine(&piece, &both, false)[3].weight, 0.05);
+    }
+
+    #[test]
+    fn a_polygon_has_the_views_that_see_its_corners_and_all_of_what_lies_between() {
+        let views = [picture(0.0), picture(3.0)];
+        let wall = |x0: f32, x1: f32| [Vec3::new(x0, -1.0, 0.0), Vec3::new(x1, -1.0, 0.0), Vec3::new((x0 + x1) / 2.0, 1.6, 0.0)];
+        let all = [0b11; 3];
+        assert_eq!(view_set(&views, wall(1.0, 2.5), all), 0b11);
+        // Its corners are seen from the centre, but the plate stands before a good part of it.
+        let covered = wall(-1.2, 1.2);
+        let share = shown(&views[0], covered);
+        assert!(share > 0.3 && share < 0.9, "{share}");
+        // From x = 3 the plate stands before the part of the wall left of x = -1.1.
+        assert_eq!(view_set(&views, wall(-0.9, 1.2), all), 0b10);
+        assert_eq!(view_set(&views, wall(1.0, 2.5), [0b11, 0b01, 0b11]), 0b01);
+        assert_eq!(view_set(&views, wall(1.0, 2.5), [0b10, 0b01, 0b11]), 0);
+        let [a, b, c] = wall(1.0, 2.5);
+        assert_eq!(view_set(&views, [a, c, b], all), 0, "it turns away");
+        // A single view textures whatever it shows a part of.
+        assert_eq!(view_set(&views[..1], covered, [0; 3]), 1);
+        let hidden = [Vec3::new(-0.1, -0.1, 0.0), Vec3::new(0.1, -0.1, 0.0), Vec3::new(0.0, 0.1, 0.0)];
+        assert_eq!(view_set(&views[..1], hidden, [1; 3]), 0);
+    }
 }
