@@ -5,6 +5,7 @@ pub mod build;
 pub mod config;
 pub mod export;
 pub mod failure;
+pub mod floor;
 pub mod gallery;
 pub mod generate;
 pub mod images;

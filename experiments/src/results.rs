@@ -64,6 +64,9 @@ pub struct PipelineSummary {
     pub preprocess: Preprocess,
     /// Time to render a frame, milliseconds; reading back not included.
     pub frame_ms: Times,
+    /// The floor on the same device in the same run, median, milliseconds: one quadrilateral that textures every pixel by
+    /// projection.
+    pub floor_ms: f64,
     /// What `frame_ms` was measured by: `gpu timestamps` or `wall clock`.
     pub frame_ms_source: String,
     /// Triangles a frame.

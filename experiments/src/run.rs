@@ -16,6 +16,7 @@ use crate::audit::{self, Measured};
 use crate::build::{self, Built, Division, NoCapture, Site};
 use crate::config::{BackendName, BudgetSettings, Experiment, Pipeline, to_toml};
 use crate::failure::Failure;
+use crate::floor::floor;
 use crate::gallery::Gallery;
 use crate::measure::{self, EQUAL_FRAMES_NOTE, FrameErrors, Metrics, Rendered};
 use crate::progress::Progress;
@@ -29,6 +30,9 @@ use crate::{path, scene};
 
 /// Seed of the audits' viewpoints: fixed, so that runs compare.
 const AUDIT_SEED: u64 = 0x0061_7564_6974;
+
+/// Floor frames rendered after each walk.
+const FLOOR_FRAMES: usize = 9;
 
 /// What a command gets beside the experiment.
 pub struct Options<'a> {
@@ -280,12 +284,15 @@ impl One<'_> {
         let times: Vec<f64> = walked.iter().map(|w| w.frame_ms).collect();
         let ratios: Vec<f64> =
             walked.iter().filter_map(|w| w.cell).map(|c| opened.original_over_simplified(c)).collect();
+        drop(walker);
+        let floor = floor(&mut *device.backend, &p.views, &p.shading, FLOOR_FRAMES).map_err(failed(p.cameras.len()))?;
         let summary = PipelineSummary {
             name: name.clone(),
             strategies: serde_json::Value::Object(self.pipeline().resolved.clone()),
             device: info,
             preprocess: self.built.preprocess,
             frame_ms: Times::of(&times),
+            floor_ms: floor.p50,
             frame_ms_source: if walked.iter().all(|w| w.by_gpu) { "gpu timestamps" } else { "wall clock" }.into(),
             triangles: TriangleCounts {
                 near: of(|w| w.near_triangles),

@@ -66,10 +66,11 @@ pub fn table(runs: &[(String, Summary)]) -> String {
 }
 
 /// The columns of [`table`] and of the report's first table.
-const COLUMNS: [&str; 12] = [
+const COLUMNS: [&str; 13] = [
     "pipeline",
     "frame ms",
     "p95 ms",
+    "x floor",
     "triangles",
     "near",
     "far",
@@ -94,6 +95,7 @@ mod tests {
             device: DeviceInfo { backend: "cpu".into(), device: "test".into(), degraded: vec![] },
             preprocess: Preprocess::default(),
             frame_ms: Times::of(&[ms]),
+            floor_ms: 2.0,
             frame_ms_source: "wall clock".into(),
             triangles: TriangleCounts::default(),
             points: MeanMax::default(),
