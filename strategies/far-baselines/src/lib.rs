@@ -10,9 +10,7 @@ use farfield_core::context::Context;
 use farfield_core::draw::{Draw, DrawWhat};
 use farfield_core::id::{AssetId, Block};
 use farfield_core::scene::{ChunkSet, Scene};
-use farfield_core::strategy::{
-    Achieved, Candidate, CellJob, Covers, FarField, FarView, LeftOut, Needs, Sink, View,
-};
+use farfield_core::strategy::{Achieved, Candidate, CellJob, Covers, FarField, FarView, LeftOut, Needs, Sink, View};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

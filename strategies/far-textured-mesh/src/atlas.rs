@@ -23,7 +23,8 @@ pub(crate) struct Texels {
 /// A picture's texels, with `rings` rings of its background filled.
 pub(crate) fn texels(image: &SurfaceImage, rings: u32) -> Texels {
     let [w, h] = image.size;
-    let mut out = Texels { size: image.size, albedo: image.albedo.clone(), normal: vec![[128, 128, 128, 0]; image.depth.len()] };
+    let mut out =
+        Texels { size: image.size, albedo: image.albedo.clone(), normal: vec![[128, 128, 128, 0]; image.depth.len()] };
     let mut filled: Vec<bool> = (0..image.depth.len()).map(|i| image.hit(i)).collect();
     for (i, n) in out.normal.iter_mut().enumerate().filter(|(i, _)| filled[*i]) {
         let [x, y, z] = from_octahedral(image.normal[i]).to_array().map(|v| (v * 127.5 + 128.0) as u8);
@@ -113,7 +114,9 @@ pub(crate) fn pack(groups: &[Vec<[u32; 2]>], side: u32, max_layers: u32) -> Resu
                 found = layers[k].allocate(size).map(|a| (k, a));
             }
             let Some((k, a)) = found else {
-                return Err(Fault::Refused(format!("textured-lod-mesh: {w} x {h} texels do not fit an atlas of {side}")));
+                return Err(Fault::Refused(format!(
+                    "textured-lod-mesh: {w} x {h} texels do not fit an atlas of {side}"
+                )));
             };
             let at = a.rectangle.min;
             slots[i] = Slot { atlas, layer: k as u32, rect: [at.x as u32, at.y as u32, w, h] };

@@ -19,7 +19,12 @@ use crate::pieces::pieces;
 const MAX_LAYERS: u32 = 8;
 
 /// Bakes a cell; the far chunks do not meet its region.
-pub(crate) fn bake(own: &TexturedLodMesh, job: &CellJob<'_>, out: &dyn Sink, cx: &Context<'_>) -> Result<Vec<u8>, Fault> {
+pub(crate) fn bake(
+    own: &TexturedLodMesh,
+    job: &CellJob<'_>,
+    out: &dyn Sink,
+    cx: &Context<'_>,
+) -> Result<Vec<u8>, Fault> {
     let mut work: Vec<(u32, Piece)> = vec![];
     let mut index = Index::default();
     for (split, s) in job.cell.splits.iter().enumerate() {
@@ -30,10 +35,8 @@ pub(crate) fn bake(own: &TexturedLodMesh, job: &CellJob<'_>, out: &dyn Sink, cx:
     let mut baked = collect(cx.run, work.len(), &|i| simplify(own, job, &work[i].1, cx))?;
     report(&baked, &index, out);
 
-    let groups: Vec<Vec<[u32; 2]>> = baked
-        .iter()
-        .map(|b| b.iter().flat_map(|b| &b.views).map(|v| v.texels.size).collect())
-        .collect();
+    let groups: Vec<Vec<[u32; 2]>> =
+        baked.iter().map(|b| b.iter().flat_map(|b| &b.views).map(|v| v.texels.size).collect()).collect();
     let packing = pack(&groups, own.atlas_px, MAX_LAYERS)?;
     let atlas_id = |a: u32| LocalPayload(work.len() as u32 + a);
     for (a, &(side, layers)) in packing.atlases.iter().enumerate() {

@@ -181,7 +181,8 @@ mod tests {
     #[test]
     fn footprints_do_not_know_the_scale_and_window_depth_does() {
         let two = |k: f32| {
-            let (front, back) = (sphere(Vec3::new(-1.0, 0.3, -9.0) * k, 2.0 * k), sphere(Vec3::new(1.0, 0.0, -14.0) * k, 4.0 * k));
+            let (front, back) =
+                (sphere(Vec3::new(-1.0, 0.3, -9.0) * k, 2.0 * k), sphere(Vec3::new(1.0, 0.0, -14.0) * k, 4.0 * k));
             move |d: Vec3| front(d).into_iter().chain(back(d)).min_by(f32::total_cmp)
         };
         let home = shoot(128, &two(1.0)).1;

@@ -40,6 +40,7 @@ use serde_json::Value;
 
 pub use category::DepthMeasure;
 pub use facing::Facing;
+pub use polygon::PolygonViews;
 
 /// Textured LOD meshes.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
@@ -66,6 +67,9 @@ pub struct TexturedLodMesh {
     /// Which pictures weigh the vertices of an object that fails the view test.
     #[serde(default)]
     pub weigh: Weigh,
+    /// Which views texture a polygon of an object that fails the view test.
+    #[serde(default)]
+    pub polygon_views: PolygonViews,
     /// How depth steps are measured.
     #[serde(default)]
     pub depth: DepthMeasure,
@@ -280,11 +284,8 @@ impl FarField for TexturedLodMesh {
             Some(cell) => has_far(cell, scene)?,
             None => !scene.chunks.is_empty(),
         };
-        let left_out = |stage: &str, reason: &str| LeftOut {
-            stage: stage.into(),
-            reason: reason.into(),
-            decided: "plan".into(),
-        };
+        let left_out =
+            |stage: &str, reason: &str| LeftOut { stage: stage.into(), reason: reason.into(), decided: "plan".into() };
         let mut out = vec![];
         if !work {
             out.push(left_out("textured meshes", "nothing lies outside the cell"));

@@ -19,13 +19,13 @@ use farfield_core::strategy::{CellJob, MeshView, Subject, Verdict, VertexSeen};
 use farfield_core::{Camera, Fault};
 use glam::{DVec3, Vec3};
 
-use crate::{Lengths, TexturedLodMesh, Weigh};
 use crate::atlas::{Texels, texels};
 use crate::facing::{Eyes, Facing, faces_all, faces_some};
 use crate::object::{Piece, Welded, weld};
 use crate::pieces::WIDEST_TAN;
 use crate::polygon::view_set;
 use crate::shot::{Picture, combine, look};
+use crate::{Lengths, TexturedLodMesh, Weigh};
 
 /// A textured view that a mesh uses.
 pub(crate) struct Projection {
@@ -123,7 +123,7 @@ pub(crate) fn simplify(
     let stretch = f64::from(job.views.half_diagonal_rad()).cos().powi(-2);
     let erosion_px = f64::from(border_move) / f64::from(distance) * stretch * f64::from(px_per_tan);
     let size_px = views[0].camera.size.map(|n| n as f32);
-    let mut baked = assemble(&mesh, &out, &seen, views, own.dilate_px);
+    let mut baked = assemble(own, &mesh, &out, &seen, views);
     baked.passes = verdict.passes;
     baked.hole_px = verdict.passes.then_some(verdict.claim + erosion_px);
     baked.error_px = if verdict.passes { verdict.value as f32 } else { own.edge_px };
@@ -250,8 +250,7 @@ fn reduce(
     eyes: &Eyes,
     several_views: bool,
 ) -> Result<(Collapsed, f32), Fault> {
-    let indices: Vec<u32> =
-        mesh.triangles.iter().zip(keep).filter(|(_, k)| **k).flat_map(|(t, _)| *t).collect();
+    let indices: Vec<u32> = mesh.triangles.iter().zip(keep).filter(|(_, k)| **k).flat_map(|(t, _)| *t).collect();
     let originals: Vec<u32> = (0..keep.len() as u32).filter(|&i| keep[i as usize]).collect();
     let locked: Vec<bool> = seen.iter().map(|s| s.locked).collect();
     let live = LiveMesh::new(&mesh.positions, &indices, &locked)?;
@@ -274,11 +273,11 @@ fn reduce(
 }
 
 /// Triangles, view sets and the texels that they use.
-fn assemble(mesh: &Welded, out: &Collapsed, seen: &[VertexSeen], views: Vec<Picture>, dilate_px: u32) -> Baked {
+fn assemble(own: &TexturedLodMesh, mesh: &Welded, out: &Collapsed, seen: &[VertexSeen], views: Vec<Picture>) -> Baked {
     let triangles: Vec<[u32; 3]> = out.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     let corners = |t: [u32; 3]| t.map(|v| mesh.positions[v as usize]);
-    let sets: Vec<u32> =
-        triangles.iter().map(|&t| view_set(&views, corners(t), t.map(|v| seen[v as usize].views))).collect();
+    let sees = |t: [u32; 3]| t.map(|v| seen[v as usize].views);
+    let sets: Vec<u32> = triangles.iter().map(|&t| view_set(&views, corners(t), sees(t), own.polygon_views)).collect();
     // Views that texture nothing are left out; the others close ranks.
     let used = sets.iter().fold(0, |all, s| all | s);
     let rank = |i: usize| (used & ((1u32 << i) - 1)).count_ones();
@@ -306,7 +305,7 @@ fn assemble(mesh: &Welded, out: &Collapsed, seen: &[VertexSeen], views: Vec<Pict
     }
     let kept = views.into_iter().enumerate().filter(|(i, _)| used >> i & 1 == 1);
     let views = kept
-        .map(|(_, v)| Projection { camera: v.camera, offset: v.offset, texels: texels(&v.image, dilate_px) })
+        .map(|(_, v)| Projection { camera: v.camera, offset: v.offset, texels: texels(&v.image, own.dilate_px) })
         .collect();
     Baked { origin: mesh.origin, parts, views, hole_px: None, passes: true, error_px: 0.0, size_px: 0.0 }
 }
@@ -336,7 +335,15 @@ fn speck(mesh: &Welded, culled: &[bool], centre: DVec3, size: f32) -> Baked {
         two_sided: true,
     };
     let views = vec![];
-    Baked { origin: mesh.origin, parts: vec![(part, vec![0; 2])], views, hole_px: None, passes: true, error_px: 1.0, size_px: 1.0 }
+    Baked {
+        origin: mesh.origin,
+        parts: vec![(part, vec![0; 2])],
+        views,
+        hole_px: None,
+        passes: true,
+        error_px: 1.0,
+        size_px: 1.0,
+    }
 }
 
 #[cfg(test)]
@@ -356,7 +363,8 @@ mod tests {
     #[test]
     fn with_several_views_only_vertices_that_some_view_sees_together_or_none_sees_are_joined() {
         let seen = [0b01, 0b11, 0b10, 0b11, 0, 0].map(|views| VertexSeen { views, ..VertexSeen::default() });
-        let live = LiveMesh::new(&[Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE, -Vec3::X], &[0, 1, 2], &[]).unwrap();
+        let live =
+            LiveMesh::new(&[Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE, -Vec3::X], &[0, 1, 2], &[]).unwrap();
         let edges = [[0, 1], [0, 2], [1, 2], [0, 4], [4, 5], [1, 3]];
         let allowed = |several_views: bool| {
             let mut out = [Candidate::FORBIDDEN; 6];

@@ -51,7 +51,13 @@ fn divide(
     }
     let middle = |c: &ChunkId| scene.chunks[c.index()].bounds.centre();
     let size = Aabb::of(chunks.iter().map(middle)).size();
-    let axis = if size.x >= size.y.max(size.z) { Vec3::X } else if size.y >= size.z { Vec3::Y } else { Vec3::Z };
+    let axis = if size.x >= size.y.max(size.z) {
+        Vec3::X
+    } else if size.y >= size.z {
+        Vec3::Y
+    } else {
+        Vec3::Z
+    };
     chunks.sort_by(|a, b| middle(a).dot(axis).total_cmp(&middle(b).dot(axis)).then(a.cmp(b)));
     let upper = chunks.split_off(chunks.len() / 2);
     divide(scene, object, chunks, centre, near, out, plain);

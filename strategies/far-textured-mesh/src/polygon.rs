@@ -3,17 +3,35 @@
 //! Follows textured LOD meshes (2003, section 3.1.4): the views that see all three of its vertices. The paper leaves polygons that
 //! are partly hidden although their vertices are not to "general visibility"; here each view is checked on its own depth image: the
 //! polygon is projected, and where more than `HIDDEN_SHARE` of its pixels lie behind what was captured the view is dropped, as
-//! it is where the polygon turns away from it. For a single view the question is the other way round, whether the view shows
+//! it is where the polygon turns away from it. By default the pixels decide alone ([`PolygonViews`]): a view that loses a corner behind an
+//! outline but shows the rest is better than none, and where all views lose more, the one that shows most serves if it shows
+//! half. For a single view the question is the other way round, whether the view shows
 //! anything of the polygon: what it does show must come from its picture, and what it hides is seen by a few pixels at most.
 //!
 //! O(pixels of the polygon), at most about `MOST_SAMPLES`.
 
 use glam::{Vec2, Vec3};
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::shot::Picture;
+
+/// What makes a view one of a polygon's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PolygonViews {
+    /// It shows nine tenths of the polygon's pixels; where none does, the one that shows most, if that is half.
+    #[default]
+    Pixels,
+    /// It sees all three vertices, as printed, and shows nine tenths of the pixels.
+    Vertices,
+}
 
 /// A view that loses more of a polygon's pixels than this to something before it does not texture it.
 const HIDDEN_SHARE: f32 = 0.1;
+/// The least that a view has to show of a polygon that no view shows well.
+const LEAST_SHARE: f32 = 0.5;
 /// A simplified polygon may lie this many footprints behind the surface it stands for without being hidden by it: twice the step
 /// that makes an interior silhouette.
 const SLACK_PX: f32 = 8.0;
@@ -58,11 +76,20 @@ fn depth_at([a, b, c]: [Vec3; 3], p: Vec2) -> Option<f32> {
 }
 
 /// The set of views that texture a triangle. `vertices` are the sets that see its corners.
-pub(crate) fn view_set(views: &[Picture], t: [Vec3; 3], vertices: [u32; 3]) -> u32 {
+pub(crate) fn view_set(views: &[Picture], t: [Vec3; 3], vertices: [u32; 3], by: PolygonViews) -> u32 {
     if let [only] = views {
         return u32::from(shown(only, t) > 0.0);
     }
-    let common = vertices[0] & vertices[1] & vertices[2];
-    let keeps = |i: &usize| common >> i & 1 == 1 && shown(&views[*i], t) >= 1.0 - HIDDEN_SHARE;
-    (0..views.len()).filter(keeps).fold(0, |set, i| set | 1 << i)
+    let allowed = match by {
+        PolygonViews::Vertices => vertices[0] & vertices[1] & vertices[2],
+        PolygonViews::Pixels => u32::MAX,
+    };
+    let shares: Vec<f32> =
+        views.iter().enumerate().map(|(i, v)| if allowed >> i & 1 == 1 { shown(v, t) } else { 0.0 }).collect();
+    let set = shares.iter().enumerate().filter(|(_, s)| **s >= 1.0 - HIDDEN_SHARE).fold(0, |set, (i, _)| set | 1 << i);
+    if set != 0 || by == PolygonViews::Vertices {
+        return set;
+    }
+    let best = (0..views.len()).rev().max_by(|&a, &b| shares[a].total_cmp(&shares[b]));
+    best.filter(|&i| shares[i] >= LEAST_SHARE).map_or(0, |i| 1 << i)
 }

@@ -54,9 +54,12 @@ impl SimplificationMetric for Quadric {
         px: &'a (dyn Fn(Vec3, Vec3) -> f32 + Sync),
         max_px: f32,
     ) -> Result<(Box<dyn Cost + 'a>, f32), Fault> {
-        if !(self.share.is_finite() && self.share > 0.0 && self.border_weight.is_finite() && self.border_weight >= 0.0) {
+        if !(self.share.is_finite() && self.share > 0.0 && self.border_weight.is_finite() && self.border_weight >= 0.0)
+        {
             let (a, b) = (self.share, self.border_weight);
-            return Err(Fault::Refused(format!("quadric: share = {a} has to be above 0 and border_weight = {b} at least 0")));
+            return Err(Fault::Refused(format!(
+                "quadric: share = {a} has to be above 0 and border_weight = {b} at least 0"
+            )));
         }
         let locked: Vec<bool> = seen.iter().map(|s| s.locked).collect();
         let live = LiveMesh::new(mesh.positions, mesh.indices, &locked)?;

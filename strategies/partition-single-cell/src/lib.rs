@@ -83,7 +83,8 @@ impl Cells for One {
         let sectors = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z]
             .map(|axis| {
                 let corners = face(&self.window_box, axis);
-                let beyond = |c: &ChunkId| everywhere || reach(&scene.chunks[c.index()].bounds, axis) > corners[0].dot(axis);
+                let beyond =
+                    |c: &ChunkId| everywhere || reach(&scene.chunks[c.index()].bounds, axis) > corners[0].dot(axis);
                 let seen = far.iter().filter(beyond).collect();
                 Sector { split: SplitId(0), window: Window { axis, corners, px_per_tan: self.px_per_tan }, seen }
             })

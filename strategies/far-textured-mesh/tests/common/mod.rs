@@ -1,24 +1,21 @@
 //! Baking one cell in memory: scenes, a sink, an executor of any number of threads.
 
 use std::collections::BTreeMap;
-use std::io::Read;
-use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use farfield_core::Fault;
 use farfield_core::camera::ViewModel;
 use farfield_core::cell::{Cell, Outline};
 use farfield_core::claim::Claim;
 use farfield_core::context::{Context, Executor, Forget};
-use farfield_core::id::{CellId, LocalPayload, MaterialId};
-use farfield_core::mesh::TriangleMesh;
+use farfield_core::id::{CellId, LocalPayload};
 use farfield_core::payload::Payload;
-use farfield_core::scene::{Material, Placement, Scene, SceneBuilder};
+use farfield_core::scene::Scene;
 use farfield_core::strategy::{CellJob, Cells, FarField, LeftOut, Partition, Sink};
-use farfield_core::{Aabb, Fault};
 use farfield_cpu::CpuCapture;
 use farfield_partition_hex::HexCells;
-use glam::{DAffine3, DQuat, DVec3, Vec3};
+use glam::DVec3;
 
 /// What a bake put out.
 #[derive(Default)]
@@ -83,16 +80,6 @@ pub(crate) fn views(eye_height: f32, resolution: u32) -> ViewModel {
     }
 }
 
-/// One mesh, turned about the vertical, alone in a scene.
-pub(crate) fn alone(mesh: TriangleMesh, yaw_deg: f64, scale: f64) -> Scene {
-    let mut b = SceneBuilder::default();
-    b.materials.push(Material::default());
-    let mesh = b.mesh("object", mesh).unwrap();
-    let turn = DQuat::from_rotation_y(yaw_deg.to_radians());
-    b.place(Placement { mesh, transform: DAffine3::from_scale_rotation_translation(DVec3::splat(scale), turn, DVec3::ZERO) });
-    b.build().unwrap()
-}
-
 /// Hexagonal cells of a scene, reaching `cells` cells beyond it.
 pub(crate) fn hexagons(scene: &Scene, views: &ViewModel, edge: f32, cells: f32) -> Box<dyn Cells> {
     let capture = CpuCapture::new(scene).unwrap();
@@ -144,42 +131,4 @@ pub(crate) fn textured(settings: &str) -> Box<dyn FarField> {
 
 pub(crate) fn triangles(kept: &Kept) -> u64 {
     kept.payloads.values().map(Payload::triangles).sum()
-}
-
-/// The folder of real meshes; `None`, said loudly, where there is none.
-pub(crate) fn models() -> Option<PathBuf> {
-    let expected = std::env::var_os("FARFIELD_EXPECT_MODELS").is_some_and(|v| v == "1");
-    match std::env::var_os("FARFIELD_MODELS").map(PathBuf::from).filter(|p| p.is_dir()) {
-        Some(p) => Some(p),
-        None if expected => panic!("FARFIELD_MODELS names no folder, and FARFIELD_EXPECT_MODELS = 1"),
-        None => {
-            println!("SKIPPED: FARFIELD_MODELS names no folder of meshes");
-            None
-        }
-    }
-}
-
-/// Positions and triangles of an ascii PLY of vertices (x y z ...) and triangular faces, scaled axis by axis to `size` and put on
-/// the ground.
-pub(crate) fn ascii_ply(path: &Path, size: Vec3) -> TriangleMesh {
-    let mut text = String::new();
-    flate2::read::GzDecoder::new(std::fs::File::open(path).unwrap()).read_to_string(&mut text).unwrap();
-    let (head, body) = text.split_once("end_header\n").unwrap();
-    let count = |what: &str| -> usize {
-        head.lines().find_map(|l| l.strip_prefix(what)).unwrap().trim().parse().unwrap()
-    };
-    let (vertices, faces) = (count("element vertex"), count("element face"));
-    let mut lines = body.lines();
-    let numbers = |line: &str| -> Vec<f32> { line.split_whitespace().map(|n| n.parse().unwrap()).collect() };
-    let mut positions: Vec<Vec3> = lines.by_ref().take(vertices).map(|l| Vec3::from_slice(&numbers(l))).collect();
-    let indices: Vec<u32> = lines.take(faces).flat_map(|l| numbers(l)[1..4].to_vec()).map(|n| n as u32).collect();
-    let b = Aabb::of(positions.iter().copied());
-    let foot = b.centre().with_y(b.min.y);
-    positions.iter_mut().for_each(|p| *p = (*p - foot) * size / b.size());
-    TriangleMesh {
-        sections: vec![(0..indices.len() as u32, MaterialId(0))],
-        positions,
-        indices,
-        ..TriangleMesh::default()
-    }
 }
