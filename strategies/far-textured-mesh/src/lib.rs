@@ -265,7 +265,8 @@ fn has_far(cell: &Cell, scene: &Scene) -> Result<bool, Fault> {
     let region = &cell.outline.region;
     for c in cell.splits.iter().flat_map(|s| s.far.iter()) {
         let chunk = &scene.chunks[c.index()];
-        if !(region.distance(&chunk.bounds) > 0.0) {
+        let distance = region.distance(&chunk.bounds);
+        if distance.is_nan() || distance <= 0.0 {
             return Err(Fault::Refused(format!(
                 "textured-lod-mesh: a far part of object {} meets the viewpoints of cell {}: give the partition a region (or cells) \
                  that the far geometry lies outside of, or take a far field that serves any viewpoint",

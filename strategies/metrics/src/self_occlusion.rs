@@ -67,7 +67,7 @@ impl Default for SelfOcclusion {
 
 /// s of the module's text, pixels. Infinite where the object is not ahead; 0 for one without depth.
 fn published_px(radius: f64, d: f64, l: f64, px_per_tan: f64) -> f64 {
-    if !(d > 0.0) {
+    if d.is_nan() || d <= 0.0 {
         return f64::INFINITY;
     }
     radius * (l / d / (d + l)) * px_per_tan
@@ -75,7 +75,7 @@ fn published_px(radius: f64, d: f64, l: f64, px_per_tan: f64) -> f64 {
 
 /// The claim of the module's text, pixels. Infinite where the object touches the region.
 fn bound_px(radius: f64, from_region: f64, nearest: f64, depth: f64, stretch: f64, px_per_tan: f64) -> f64 {
-    if !(from_region > 0.0) {
+    if from_region.is_nan() || from_region <= 0.0 {
         return f64::INFINITY;
     }
     radius * (depth / from_region / from_region.max(nearest + depth - radius)) * stretch * px_per_tan
@@ -84,7 +84,7 @@ fn bound_px(radius: f64, from_region: f64, nearest: f64, depth: f64, stretch: f6
 #[typetag::serde(name = "self-occlusion")]
 impl VisibilityMetric for SelfOcclusion {
     fn judge(&self, subject: &Subject<'_>, _cx: &Context<'_>) -> Result<Verdict, Fault> {
-        if !(self.max_px >= 0.0) {
+        if self.max_px.is_nan() || self.max_px < 0.0 {
             return Err(Fault::Refused(format!("self-occlusion: max_px = {} is no number of pixels", self.max_px)));
         }
         let (value, claim) = measure(subject);
