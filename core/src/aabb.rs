@@ -55,11 +55,7 @@ impl Aabb {
     pub fn corners(&self) -> [Vec3; 8] {
         std::array::from_fn(|i| {
             let pick = |bit: usize, a: f32, b: f32| if i >> bit & 1 == 0 { a } else { b };
-            Vec3::new(
-                pick(0, self.min.x, self.max.x),
-                pick(1, self.min.y, self.max.y),
-                pick(2, self.min.z, self.max.z),
-            )
+            Vec3::new(pick(0, self.min.x, self.max.x), pick(1, self.min.y, self.max.y), pick(2, self.min.z, self.max.z))
         })
     }
 
@@ -75,9 +71,6 @@ impl Aabb {
         }
         let down = |x: f64| if f64::from(x as f32) > x { (x as f32).next_down() } else { x as f32 };
         let up = |x: f64| if f64::from(x as f32) < x { (x as f32).next_up() } else { x as f32 };
-        Self {
-            min: Vec3::new(down(min.x), down(min.y), down(min.z)),
-            max: Vec3::new(up(max.x), up(max.y), up(max.z)),
-        }
+        Self { min: Vec3::new(down(min.x), down(min.y), down(min.z)), max: Vec3::new(up(max.x), up(max.y), up(max.z)) }
     }
 }

@@ -42,7 +42,18 @@ impl Camera {
         let right = if side.length_squared() > 1e-12 { side.normalize() } else { forward.any_orthonormal_vector() };
         let top = (0.5 * fov_y).tan();
         let right_tan = top * size[0] as f32 / size[1] as f32;
-        Self { eye, right, up: right.cross(forward), forward, left: -right_tan, right_tan, bottom: -top, top, size, near }
+        Self {
+            eye,
+            right,
+            up: right.cross(forward),
+            forward,
+            left: -right_tan,
+            right_tan,
+            bottom: -top,
+            top,
+            size,
+            near,
+        }
     }
 
     /// The camera at `eye` that looks along `axis` and whose picture just holds `points`, at `px_per_tan` pixels a unit
@@ -216,14 +227,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn camera() -> Camera {
-        let mut c = Camera::looking(
-            DVec3::new(1.0, 2.0, 3.0),
-            Vec3::new(0.3, -0.2, -1.0),
-            Vec3::Y,
-            1.0,
-            [640, 480],
-            0.1,
-        );
+        let mut c =
+            Camera::looking(DVec3::new(1.0, 2.0, 3.0), Vec3::new(0.3, -0.2, -1.0), Vec3::Y, 1.0, [640, 480], 0.1);
         c.left *= 1.3;
         c.top *= 0.7;
         c

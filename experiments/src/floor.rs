@@ -33,12 +33,8 @@ pub fn floor(backend: &mut dyn Backend, views: &ViewModel, shading: &Shading, fr
     let bounds = Aabb::of(positions.iter().copied());
     let px = camera.px_per_tan();
     let row = |axis: Vec3, middle: f32| (axis * px + camera.forward * middle).extend(0.0);
-    let rows = [
-        row(camera.right, 0.5 * w as f32),
-        row(-camera.up, 0.5 * h as f32),
-        Vec4::ZERO,
-        camera.forward.extend(0.0),
-    ];
+    let rows =
+        [row(camera.right, 0.5 * w as f32), row(-camera.up, 0.5 * h as f32), Vec4::ZERO, camera.forward.extend(0.0)];
     let projector = Projector {
         matrix: Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose(),
         eye: Vec3::ZERO,
@@ -99,8 +95,7 @@ mod tests {
             max_speed: 1.0,
             max_turn_rad: 1.0,
         };
-        let shading =
-            Shading { ambient: Vec3::ONE, lights: vec![], sky: [1, 2, 3], ground: [4, 5, 6] };
+        let shading = Shading { ambient: Vec3::ONE, lights: vec![], sky: [1, 2, 3], ground: [4, 5, 6] };
         let times = floor(&mut backend, &views, &shading, 3).unwrap();
         assert!(times.max > 0.0);
         let expected = atlas(32, 24).albedo;

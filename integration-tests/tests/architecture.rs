@@ -72,7 +72,8 @@ fn arrows_go_one_way() {
 }
 
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
-    let mut entries: Vec<_> = std::fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").path()).collect();
+    let mut entries: Vec<_> =
+        std::fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").path()).collect();
     entries.sort();
     for p in entries {
         if p.is_dir() {
@@ -120,7 +121,15 @@ fn strategies_have_no_files_no_clock_and_no_threads() {
 #[test]
 fn unsafe_code_lives_in_the_vulkan_backend_only() {
     let words = ["unsafe {", "unsafe fn", "unsafe impl"];
-    for folder in ["core/src", "strategies", "backends/cpu/src", "backends/shaders/src", "cli/src", "experiments/src", "xtask/src"] {
+    for folder in [
+        "core/src",
+        "strategies",
+        "backends/cpu/src",
+        "backends/shaders/src",
+        "cli/src",
+        "experiments/src",
+        "xtask/src",
+    ] {
         assert_eq!(uses(folder, &words), Vec::<String>::new());
     }
     assert!(!uses("backends/vulkan/src", &words).is_empty(), "the search itself works");

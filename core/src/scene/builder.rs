@@ -111,7 +111,10 @@ impl SceneBuilder {
             let mesh = &infos[p.mesh.index()];
             let placement = DAffine3::from_translation(-origin) * p.transform;
             if !placement.is_finite() || placement.matrix3.determinant() == 0.0 {
-                return Err(Fault::Data { place: place(i), cause: "its transform is not finite or flattens it".into() });
+                return Err(Fault::Data {
+                    place: place(i),
+                    cause: "its transform is not finite or flattens it".into(),
+                });
             }
             let first = chunks.len() as u32;
             for (k, c) in mesh.chunks.iter().enumerate() {

@@ -139,7 +139,9 @@ mod tests {
             })
             .collect();
         TriangleMesh {
-            positions: (0..(n + 1) * (n + 1)).map(|i| Vec3::new((i % (n + 1)) as f32, 0.0, (i / (n + 1)) as f32)).collect(),
+            positions: (0..(n + 1) * (n + 1))
+                .map(|i| Vec3::new((i % (n + 1)) as f32, 0.0, (i / (n + 1)) as f32))
+                .collect(),
             sections: vec![(0..indices.len() as u32, MaterialId(0))],
             indices,
             ..Default::default()

@@ -207,7 +207,9 @@ pub fn join(claimant: &str, measured: &[Measured]) -> Vec<BoundAudit> {
                 samples: values.len(),
                 violations: all.iter().filter(|m| m.violates()).count(),
                 note: match quantity {
-                    Quantity::HoleWidthPx => "a sample violates its own claim when it exceeds it by more than one pixel".into(),
+                    Quantity::HoleWidthPx => {
+                        "a sample violates its own claim when it exceeds it by more than one pixel".into()
+                    }
                     Quantity::NearTriangles => String::new(),
                 },
             }

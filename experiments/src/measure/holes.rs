@@ -24,7 +24,9 @@ pub fn hole_width_px(mask: &[bool], size: [u32; 2]) -> f64 {
         return 0.0;
     }
     let mut shortest = vec![f32::INFINITY; mask.len()];
-    for (dx, dy, step) in [(1, 0, 1.0), (0, 1, 1.0), (1, 1, std::f32::consts::SQRT_2), (-1, 1, std::f32::consts::SQRT_2)] {
+    for (dx, dy, step) in
+        [(1, 0, 1.0), (0, 1, 1.0), (1, 1, std::f32::consts::SQRT_2), (-1, 1, std::f32::consts::SQRT_2)]
+    {
         let at = |x: i64, y: i64| (y * w + x) as usize;
         let inside = |x: i64, y: i64| (0..w).contains(&x) && (0..h).contains(&y) && mask[at(x, y)];
         for y in 0..h {

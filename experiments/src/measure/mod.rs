@@ -131,7 +131,10 @@ mod tests {
         let size = [32, 32];
         let at = |i: u32| (i % 32, i / 32);
         Rendered {
-            picture: Picture { size, rgba: (0..1024).map(at).map(|(x, y)| [value(x, y); 3]).map(|[r, g, b]| [r, g, b, 255]).collect() },
+            picture: Picture {
+                size,
+                rgba: (0..1024).map(at).map(|(x, y)| [value(x, y); 3]).map(|[r, g, b]| [r, g, b, 255]).collect(),
+            },
             surface: SurfaceImage {
                 size,
                 object: (0..1024).map(at).map(|(x, y)| u32::from(hit(x, y))).collect(),

@@ -42,24 +42,37 @@ pub(super) fn row(name: &str, p: &PipelineSummary) -> Vec<String> {
 pub(super) fn run(s: &Summary, frames: &[FrameRow], gallery: &[Shown]) -> io::Result<String> {
     let mut h = page("farfield report");
     let f = &s.scene;
-    push(&mut h, format_args!(
-        "<p>{} &mdash; {} triangles, {} objects; {} frames of {} x {} pixels. Machine: {} cores, {}. Pictures are compared with \
+    push(
+        &mut h,
+        format_args!(
+            "<p>{} &mdash; {} triangles, {} objects; {} frames of {} x {} pixels. Machine: {} cores, {}. Pictures are compared with \
          <b>{}</b>, in display space.</p>",
-        text(&f.source), f.triangles, f.objects, f.frames, f.resolution_px[0], f.resolution_px[1], s.device.cores,
-        text(&s.device.system), text(&s.reference),
-    ));
+            text(&f.source),
+            f.triangles,
+            f.objects,
+            f.frames,
+            f.resolution_px[0],
+            f.resolution_px[1],
+            s.device.cores,
+            text(&s.device.system),
+            text(&s.reference),
+        ),
+    );
     h += "<h2>Error against run time</h2>";
     h += &error_against_time(&points(s, ""))?;
-    h += "<p class=note>Up and to the left is better. The floor is the time of one quadrilateral that textures every pixel by \
+    h += "<p class=note>Up and to the left is better; pipelines whose every frame equals the reference have no point. The floor is the time of one quadrilateral that textures every pixel by \
           projection, on the same device in the same run.</p>";
     pipelines(&mut h, &[(String::new(), s)]);
     push(&mut h, format_args!("<p class=note>Means: {}.</p>", text(&s.equal_frames_note)));
     let times = s.pipelines.iter().filter(|p| p.device.backend == "cpu").map(|p| text(&p.name)).collect::<Vec<_>>();
     if !times.is_empty() {
-        push(&mut h, format_args!(
-            "<p class=note>Drawn by the cpu reference, whose time hardly depends on triangles: {}. Lean on the counts there.</p>",
-            times.join(", ")
-        ));
+        push(
+            &mut h,
+            format_args!(
+                "<p class=note>Drawn by the cpu reference, whose time hardly depends on triangles: {}. Lean on the counts there.</p>",
+                times.join(", ")
+            ),
+        );
     }
     details(&mut h, s);
     h += "<h2>Frame by frame</h2>";
@@ -70,12 +83,19 @@ pub(super) fn run(s: &Summary, frames: &[FrameRow], gallery: &[Shown]) -> io::Re
         h += "<h2>Pictures</h2>";
     }
     for g in gallery {
-        push(&mut h, format_args!(
-            "<figure><div class=trio><div>{}</div><div>{}</div><div>{}</div></div><figcaption>{}, frame {}, {}: reference, candidate, \
+        push(
+            &mut h,
+            format_args!(
+                "<figure><div class=trio><div>{}</div><div>{}</div><div>{}</div></div><figcaption>{}, frame {}, {}: reference, candidate, \
              luminance difference x 8</figcaption></figure>",
-            picture(&g.reference)?, picture(&g.candidate)?, picture(&difference(&g.reference, &g.candidate))?,
-            text(&g.pipeline), g.frame, text(&g.caption),
-        ));
+                picture(&g.reference)?,
+                picture(&g.candidate)?,
+                picture(&difference(&g.reference, &g.candidate))?,
+                text(&g.pipeline),
+                g.frame,
+                text(&g.caption),
+            ),
+        );
     }
     h += "</body></html>\n";
     Ok(h)
@@ -89,18 +109,27 @@ pub(super) fn compare(runs: &[(String, Summary)]) -> io::Result<String> {
     let named: Vec<(String, &Summary)> = runs.iter().map(|(n, s)| (format!("{n}: "), s)).collect();
     pipelines(&mut h, &named);
     for (name, s) in runs {
-        push(&mut h, format_args!(
-            "<p class=note>{}: {}, {} triangles, {} x {} pixels, against {}.</p>",
-            text(name), text(&s.scene.source), s.scene.triangles, s.scene.resolution_px[0], s.scene.resolution_px[1],
-            text(&s.reference),
-        ));
+        push(
+            &mut h,
+            format_args!(
+                "<p class=note>{}: {}, {} triangles, {} x {} pixels, against {}.</p>",
+                text(name),
+                text(&s.scene.source),
+                s.scene.triangles,
+                s.scene.resolution_px[0],
+                s.scene.resolution_px[1],
+                text(&s.reference),
+            ),
+        );
     }
     h += "</body></html>\n";
     Ok(h)
 }
 
 fn page(title: &str) -> String {
-    format!("<!doctype html><html lang=en><head><meta charset=utf-8><title>{title}</title><style>{STYLE}</style></head><body><h1>{title}</h1>")
+    format!(
+        "<!doctype html><html lang=en><head><meta charset=utf-8><title>{title}</title><style>{STYLE}</style></head><body><h1>{title}</h1>"
+    )
 }
 
 fn push(h: &mut String, what: std::fmt::Arguments<'_>) {
@@ -114,12 +143,8 @@ fn text(s: &str) -> String {
 
 fn points(s: &Summary, prefix: &str) -> Vec<Point> {
     let of = |p: &PipelineSummary| {
-        let e = p.error.as_ref()?;
-        Some(Point {
-            label: format!("{prefix}{}", p.name),
-            frame_ms: p.frame_ms.mean,
-            psnr_y_db: e.psnr_y_db.mean,
-        })
+        let e = p.error.as_ref().filter(|e| e.equal_frames < e.frames)?;
+        Some(Point { label: format!("{prefix}{}", p.name), frame_ms: p.frame_ms.mean, psnr_y_db: e.psnr_y_db.mean })
     };
     s.pipelines.iter().filter_map(of).collect()
 }
@@ -146,11 +171,21 @@ fn details(h: &mut String, s: &Summary) {
         *h += "<table><tr><th>pipeline</th><th>claimant</th><th>quantity</th><th>claimed max</th><th>measured max</th><th>p99</th>\
                <th>samples</th><th>violations</th></tr>";
         for (p, b) in s.pipelines.iter().flat_map(|p| p.bounds.iter().map(move |b| (p, b))) {
-            push(h, format_args!(
-                "<tr><td>{}</td><td class=t>{}</td><td class=t>{}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{}</td><td{}>{}</td></tr>",
-                text(&p.name), text(&b.claimant), b.quantity.name(), b.predicted_max, b.measured_max, b.measured_p99, b.samples,
-                if b.violations > 0 { " class=bad" } else { "" }, b.violations,
-            ));
+            push(
+                h,
+                format_args!(
+                    "<tr><td>{}</td><td class=t>{}</td><td class=t>{}</td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{}</td><td{}>{}</td></tr>",
+                    text(&p.name),
+                    text(&b.claimant),
+                    b.quantity.name(),
+                    b.predicted_max,
+                    b.measured_max,
+                    b.measured_p99,
+                    b.samples,
+                    if b.violations > 0 { " class=bad" } else { "" },
+                    b.violations,
+                ),
+            );
         }
         *h += "</table><p class=note>Viewpoints are held out from building. Samples can refute a bound, not prove it.</p>";
     }
@@ -158,28 +193,53 @@ fn details(h: &mut String, s: &Summary) {
            <th>stored MB</th><th>peak RSS MB</th><th>original : simplified</th></tr>";
     for p in &s.pipelines {
         let b = &p.preprocess;
-        push(h, format_args!(
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.1}</td><td>{:.1}</td><td>{:.0}</td><td>{}</td></tr>",
-            text(&p.name), b.cells_built, b.cells_needed, b.cells_total, b.seconds, b.bytes_stored as f64 / 1e6,
-            b.peak_rss_bytes as f64 / 1e6,
-            if p.original_over_simplified > 0.0 { format!("{:.1} : 1", p.original_over_simplified) } else { "-".into() },
-        ));
+        push(
+            h,
+            format_args!(
+                "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.1}</td><td>{:.1}</td><td>{:.0}</td><td>{}</td></tr>",
+                text(&p.name),
+                b.cells_built,
+                b.cells_needed,
+                b.cells_total,
+                b.seconds,
+                b.bytes_stored as f64 / 1e6,
+                b.peak_rss_bytes as f64 / 1e6,
+                if p.original_over_simplified > 0.0 {
+                    format!("{:.1} : 1", p.original_over_simplified)
+                } else {
+                    "-".into()
+                },
+            ),
+        );
     }
     *h += "</table><ul>";
     for (p, l) in s.pipelines.iter().flat_map(|p| p.left_out.iter().map(move |l| (p, l))) {
-        push(h, format_args!(
-            "<li><b>{}</b>: {} left out: {} (decided: {})</li>",
-            text(&p.name), text(&l.stage), text(&l.reason), text(&l.decided)
-        ));
+        push(
+            h,
+            format_args!(
+                "<li><b>{}</b>: {} left out: {} (decided: {})</li>",
+                text(&p.name),
+                text(&l.stage),
+                text(&l.reason),
+                text(&l.decided)
+            ),
+        );
     }
     *h += "</ul><h2>Settings</h2>";
     for p in &s.pipelines {
         let json = serde_json::to_string_pretty(&p.strategies).unwrap_or_default();
-        push(h, format_args!(
-            "<details><summary>{} &mdash; {} on {}, time by {}</summary><pre>{}</pre>{}</details>",
-            text(&p.name), text(&p.device.backend), text(&p.device.device), text(&p.frame_ms_source), text(&json),
-            p.device.degraded.iter().map(|d| format!("<p class=note>{}</p>", text(d))).collect::<String>(),
-        ));
+        push(
+            h,
+            format_args!(
+                "<details><summary>{} &mdash; {} on {}, time by {}</summary><pre>{}</pre>{}</details>",
+                text(&p.name),
+                text(&p.device.backend),
+                text(&p.device.device),
+                text(&p.frame_ms_source),
+                text(&json),
+                p.device.degraded.iter().map(|d| format!("<p class=note>{}</p>", text(d))).collect::<String>(),
+            ),
+        );
     }
 }
 

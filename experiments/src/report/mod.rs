@@ -60,7 +60,10 @@ pub fn table(runs: &[(String, Summary)]) -> String {
     let widths: Vec<usize> = (0..COLUMNS.len()).map(width).collect();
     let line = |r: &Vec<String>| {
         let cells = r.iter().zip(&widths).enumerate();
-        cells.map(|(i, (c, &w))| if i == 0 { format!("{c:<w$}") } else { format!("{c:>w$}") }).collect::<Vec<_>>().join("  ")
+        cells
+            .map(|(i, (c, &w))| if i == 0 { format!("{c:<w$}") } else { format!("{c:>w$}") })
+            .collect::<Vec<_>>()
+            .join("  ")
     };
     rows.iter().map(|r| line(r).trim_end().to_owned() + "\n").collect()
 }
@@ -103,7 +106,11 @@ mod tests {
             resident_bytes: 0,
             frames_outside_cells: 0,
             original_over_simplified: 0.0,
-            error: psnr.map(|d| ErrorSummary { psnr_y_db: MeanMin { mean: d, min: d }, ..Default::default() }),
+            error: psnr.map(|d| ErrorSummary {
+                frames: 1,
+                psnr_y_db: MeanMin { mean: d, min: d },
+                ..Default::default()
+            }),
             bounds: vec![],
             left_out: vec![],
         };
