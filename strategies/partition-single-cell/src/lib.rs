@@ -191,7 +191,7 @@ mod tests {
         assert_eq!(cells.find(&views().camera(DVec3::new(0.0, 3.0, 0.0), 0.0, 0.0)), None);
         for c in far.iter() {
             for eye in inside.outline.region.corners().unwrap() {
-                let eye = eye * 0.999;
+                let eye = eye.lerp(inside.outline.centre, 0.001);
                 let p = s.chunks[c.index()].bounds.centre();
                 let camera = Camera::looking(eye.as_dvec3(), p - eye, Vec3::Y, 0.02, [8, 8], 0.01);
                 let sectors = cells.active(&inside, &camera).sectors;
