@@ -65,3 +65,27 @@ fn a_damaged_block_is_reported_and_built_again() {
     let said = String::from_utf8_lossy(&out.stderr).into_owned();
     assert!(out.status.success() && !said.contains("is damaged"), "{said}");
 }
+
+#[test]
+fn an_interrupted_build_says_so_ends_with_1_and_goes_on() {
+    let f = Folder::new();
+    let caught = (0..5).any(|i| {
+        let store = format!("store{i}");
+        let mut command = f.command(&["build", "experiment.toml", "--store", &store, "--threads", "1"]);
+        let child = command.stderr(std::process::Stdio::piped()).stdout(std::process::Stdio::null()).spawn().unwrap();
+        let start = Instant::now();
+        while blocks(&f.path(&store)) < 2 && start.elapsed() < Duration::from_secs(120) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let sent = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        let out = child.wait_with_output().unwrap();
+        if !sent.success() || out.status.success() {
+            return false;
+        }
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.code() == Some(1) && said.contains("stopped"), "{:?} {said}", out.status);
+        f.ok(&["build", "experiment.toml", "--store", &store]);
+        true
+    });
+    assert!(caught, "the build was never caught at work");
+}
