@@ -1,3 +1,5 @@
 //! Conformance, parity, golden images, the matrix.
 
 pub mod conformance;
+pub mod lab;
+pub mod stones;
