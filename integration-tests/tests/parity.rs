@@ -160,7 +160,7 @@ fn vases(count: u32, at: DVec3, seed: u64) -> Scene {
         }
         let place = DVec3::new(unit(-7.0, 7.0), unit(-1.0, 3.0), unit(-7.0, 7.0));
         let matrix = DMat3::from_quat(turn) * DMat3::from_diagonal(scale);
-        let transform = DAffine3 { matrix3: matrix.into(), translation: at + place };
+        let transform = DAffine3 { matrix3: matrix, translation: at + place };
         b.place(Placement { mesh: meshes[i as usize % 3], transform });
     }
     b.build().unwrap()
@@ -317,7 +317,8 @@ fn plain_and_projected_payloads_are_the_same() {
         pair.upload(id(local.0), &atlas(size, layers, &mut rng));
     }
     // No view, one, two, many, and sets of every size over the triangles of one ball.
-    let sets: [(&str, usize, &dyn Fn(usize) -> u32); 5] = [
+    type Sets<'a> = (&'a str, usize, &'a dyn Fn(usize) -> u32);
+    let sets: [Sets<'_>; 5] = [
         ("no view", 0, &|_| 0),
         ("one view", 1, &|_| 1),
         ("two views", 2, &|_| 3),
