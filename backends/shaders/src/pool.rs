@@ -139,7 +139,7 @@ impl Pool {
         let grown = self.total_bytes.clamp(self.sizes.first_bytes, self.sizes.usual_bytes);
         let capacity = u32::try_from(grown.max(wanted) / stride).ok()?;
         let bytes = u64::from(capacity) * stride;
-        let mut free = FreeList(Vec::from([(0..capacity)]));
+        let mut free = FreeList(std::iter::once(0..capacity).collect());
         let first = free.take(len)?;
         self.pages.push(free);
         self.total_bytes += bytes;
