@@ -136,7 +136,7 @@ impl Pool {
         if wanted > self.sizes.max_bytes {
             return None;
         }
-        let grown = self.total_bytes.clamp(self.sizes.first_bytes, self.sizes.usual_bytes);
+        let grown = self.total_bytes.max(self.sizes.first_bytes).min(self.sizes.usual_bytes);
         let capacity = u32::try_from(grown.max(wanted) / stride).ok()?;
         let bytes = u64::from(capacity) * stride;
         let mut free = FreeList(std::iter::once(0..capacity).collect());

@@ -277,3 +277,107 @@ impl Residency {
         matches!(parts, Some([PartSlot::Atlas { empty: false }, ..]))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use farfield_core::Aabb;
+    use farfield_core::mesh::ChunkMesh;
+    use farfield_core::payload::{AtlasPart, Projector};
+    use glam::{Mat4, Vec3};
+
+    fn residency(max_bytes: u64) -> Residency {
+        Residency::new(PageSizes { first_bytes: 4096, usual_bytes: 8192, max_bytes }, max_bytes)
+    }
+
+    fn id(n: u32) -> PayloadRef {
+        PayloadRef { asset: AssetId(0), id: LocalPayload(n) }
+    }
+
+    fn chunk(triangles: u32) -> ChunkMesh {
+        let n = 3 * triangles;
+        ChunkMesh {
+            positions: vec![Vec3::ONE; n as usize],
+            normals: vec![Vec3::Y; n as usize],
+            vertex_ids: vec![0; n as usize],
+            indices: (0..n).collect(),
+            ..ChunkMesh::default()
+        }
+    }
+
+    /// A projected triangle whose projectors draw from so many atlases.
+    fn projected(atlases: u32) -> Payload {
+        let projector = |i| Projector {
+            matrix: Mat4::IDENTITY,
+            eye: Vec3::Z,
+            atlas: LocalPayload(i),
+            layer: 0,
+            rect: [0, 0, 4, 4],
+        };
+        let mesh = MeshPart {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            normals: vec![Vec3::Z; 3],
+            albedo: vec![[9; 4]; 3],
+            indices: vec![0, 1, 2],
+            two_sided: false,
+        };
+        let part = ProjectedPart { mesh, views: vec![1], projectors: (0..atlases).map(projector).collect() };
+        Payload { origin: DVec3::ZERO, bounds: Aabb::EMPTY, parts: vec![Part::Projected(part)] }
+    }
+
+    #[test]
+    fn what_is_written_lies_where_the_slot_says() {
+        let mut r = residency(1 << 20);
+        let chunk_id = |chunk| MeshChunkId { mesh: farfield_core::id::MeshId(0), chunk };
+        let mut firsts = vec![];
+        for (i, triangles) in [5, 1, 40].into_iter().enumerate() {
+            let id = chunk_id(i as u32);
+            let placement = r.place(Block::Chunk(id), &BlockData::Chunk(&chunk(triangles))).unwrap();
+            let (slot, has_uvs) = r.chunk(id).unwrap();
+            assert!(!has_uvs);
+            assert_eq!(placement.bytes, u64::from(triangles) * 3 * (28 + 4));
+            let (page, offset, bytes) = &placement.writes[0];
+            assert_eq!((page.index, *offset), (slot.vertices.page, u64::from(slot.vertices.first) * 28));
+            assert_eq!(bytes.len() as u32, slot.vertices.len * 28);
+            firsts.push(slot.vertices.first);
+        }
+        assert_eq!(firsts, [0, 15, 18]);
+        assert!(r.release(Block::Chunk(chunk_id(0))) && !r.release(Block::Chunk(chunk_id(0))));
+        r.place(Block::Chunk(chunk_id(7)), &BlockData::Chunk(&chunk(4))).unwrap();
+        assert_eq!(r.chunk(chunk_id(7)).unwrap().0.vertices.first, 0, "the freed range is used again");
+    }
+
+    #[test]
+    fn more_atlases_than_slots_are_refused_and_leave_nothing() {
+        let mut r = residency(1 << 20);
+        let most = ATLAS_SLOTS as u32;
+        r.place(Block::Payload(id(0)), &BlockData::Payload(&projected(most))).unwrap();
+        let fault = r.place(Block::Payload(id(1)), &BlockData::Payload(&projected(most + 1))).unwrap_err();
+        assert!(fault.to_string().contains("draws from 5 atlases"), "{fault}");
+        assert!(r.payload_slot(id(1)).is_none() && r.payload_slot(id(0)).is_some());
+    }
+
+    #[test]
+    fn a_block_that_no_buffer_holds_leaves_no_page_behind() {
+        let mut r = residency(3000);
+        // 75 vertices fit (2100 bytes), 825 indices do not (3300 bytes): the page of vertices has to go again.
+        let mut c = chunk(25);
+        c.indices = c.indices.iter().cycle().take(825).copied().collect();
+        let block = Block::Chunk(MeshChunkId { mesh: farfield_core::id::MeshId(0), chunk: 0 });
+        let fault = r.place(block, &BlockData::Chunk(&c)).unwrap_err();
+        assert!(matches!(fault, Fault::Device { .. }), "{fault}");
+        let again = r.place(block, &BlockData::Chunk(&chunk(25))).unwrap();
+        assert_eq!(again.pages[0].0, PageId { stream: Stream::ChunkVertices, index: 0 }, "the page is to be made anew");
+    }
+
+    #[test]
+    fn a_replaced_atlas_is_said_to_be_gone() {
+        let mut r = residency(1 << 20);
+        let atlas = AtlasPart { size: [2, 1], layers: 1, albedo: vec![[1; 4]; 2], normal: vec![[2; 4]; 2] };
+        let with = |parts| Payload { origin: DVec3::ZERO, bounds: Aabb::EMPTY, parts };
+        let first = r.place(Block::Payload(id(3)), &BlockData::Payload(&with(vec![Part::Atlas(atlas)]))).unwrap();
+        assert!(first.atlas && first.bytes == 16 && r.has_atlas(AssetId(0), LocalPayload(3)));
+        let second = r.place(Block::Payload(id(3)), &BlockData::Payload(&with(vec![]))).unwrap();
+        assert!(!second.atlas && second.bytes == 0 && !r.has_atlas(AssetId(0), LocalPayload(3)));
+    }
+}

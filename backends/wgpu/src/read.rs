@@ -131,3 +131,29 @@ impl WgpuBackend {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use farfield_core::Camera;
+    use farfield_core::scene::ChunkSet;
+    use glam::{DVec3, Vec3};
+
+    fn shots(sizes: &[[u32; 2]]) -> Vec<Shot> {
+        let shot = |&size| Shot {
+            chunks: ChunkSet::default(),
+            camera: Camera::looking(DVec3::ZERO, Vec3::X, Vec3::Y, 1.0, size, 0.1),
+        };
+        sizes.iter().map(shot).collect()
+    }
+
+    #[test]
+    fn batches_fill_the_staging_memory_and_never_stall() {
+        // 1024 x 1024 x 4 planes x 4 bytes are 16 MiB: four fill 64 MiB.
+        assert_eq!(batch(&shots(&[[1024, 1024]; 9])), 4);
+        // Rows of one pixel take 256 bytes.
+        assert_eq!(plane_bytes([1, 10]), 2560);
+        assert_eq!(batch(&shots(&[[8192, 8192], [1, 1]])), 1, "one too large goes alone");
+        assert_eq!(batch(&shots(&[[64, 64]; 5])), 5);
+    }
+}

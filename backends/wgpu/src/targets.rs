@@ -108,3 +108,31 @@ impl Shaded {
         Ok(Self { texture, view })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_each_target_the_sizes_used_last_are_kept() {
+        let mut kept: Kept<u32> = Kept::default();
+        let other = TargetId(1);
+        kept.make(other, [9, 9], || Ok(99)).unwrap();
+        for i in 1..=3 {
+            kept.make(TargetId(0), [i, i], || Ok(i)).unwrap();
+        }
+        // Used again, so that it outlives the next one.
+        kept.make(TargetId(0), [1, 1], || panic!("it is there")).unwrap();
+        kept.make(TargetId(0), [4, 4], || Ok(4)).unwrap();
+        let there: Vec<u32> = (1..=4).filter(|&i| kept.get(TargetId(0), [i, i]).is_some()).collect();
+        assert_eq!(there, [1, 3, 4]);
+        assert_eq!(kept.get(other, [9, 9]), Some(&99));
+    }
+
+    #[test]
+    fn a_target_that_cannot_be_made_is_not_kept() {
+        let mut kept: Kept<u32> = Kept::default();
+        assert!(kept.make(TargetId(0), [1, 1], || Err(Fault::Cancelled)).is_err());
+        assert_eq!(kept.get(TargetId(0), [1, 1]), None);
+    }
+}
