@@ -126,6 +126,7 @@ fn unsafe_code_lives_in_the_vulkan_backend_only() {
         "strategies",
         "backends/cpu/src",
         "backends/shaders/src",
+        "backends/wgpu/src",
         "cli/src",
         "experiments/src",
         "xtask/src",
