@@ -57,7 +57,7 @@ fn lint() -> Result<(), String> {
     if setup::has("cargo-deny") {
         run("cargo", &["deny", "check", "bans", "licenses", "sources"])?;
     } else {
-        println!("cargo-deny is not installed: licences are checked by integration-tests only");
+        println!("cargo-deny is not installed: licences are checked by the tests alone");
     }
     Ok(())
 }
