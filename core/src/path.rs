@@ -133,14 +133,17 @@ pub fn keyed(job: &PathJob<'_>, keys: &[Key]) -> Result<Vec<Camera>, Fault> {
     Ok((0..job.frames).map(at).collect())
 }
 
+/// Tries before a tour is refused. A crowded park (230 statues on the paper's area) may need more than fifty.
+const TRIES: usize = 1000;
+
 /// A closed tour.
 ///
 /// # Errors
-/// [`Fault::Refused`] where obstacles leave no way within fifty seeded tries.
+/// [`Fault::Refused`] where obstacles leave no way within [`TRIES`] seeded tries.
 pub fn tour(job: &PathJob<'_>) -> Result<Vec<Camera>, Fault> {
     let blocked = blocks(job);
     let mut state = job.seed;
-    for _ in 0..50 {
+    for _ in 0..TRIES {
         if let Some(curve) = curve(job, &blocked, &mut state) {
             return Ok(walk(job, &curve));
         }
@@ -376,6 +379,13 @@ mod tests {
             within_limits(&job, &orbit(&job))?;
             within_limits(&job, &line(&job))?;
         }
+    }
+
+    /// Found by the property test when fifty tries were all.
+    #[test]
+    fn a_crowded_park_has_a_tour() {
+        let (views, obstacles) = (views(), park(105_634, 230));
+        assert_eq!(tour(&job(&views, &obstacles, 105_634)).unwrap().len(), 3000);
     }
 
     #[test]
