@@ -52,6 +52,7 @@ fn demo() -> Result<(), String> {
 }
 
 fn lint() -> Result<(), String> {
+    setup::compiler();
     run("cargo", &["fmt", "--all", "--check"])?;
     run("cargo", &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"])?;
     if setup::has("cargo-deny") {

@@ -18,6 +18,13 @@ pub(crate) fn driver() {
     }
 }
 
+/// A C++ compiler: the tests and benchmarks build meshoptimizer, which farfield is compared with.
+pub(crate) fn compiler() {
+    if !has("c++") && !has("g++") && !has("clang++") {
+        install("There is no C++ compiler", &["g++"], "the tests will not build");
+    }
+}
+
 /// The validation layer.
 pub(crate) fn validation() {
     let folders = ["/usr/share/vulkan/explicit_layer.d", "/etc/vulkan/explicit_layer.d"];

@@ -8,6 +8,7 @@ use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
 pub(crate) fn run(more: &[String]) -> Result<(), String> {
+    crate::setup::compiler();
     crate::setup::driver();
     crate::setup::validation();
     let ci = std::env::var_os("CI").is_some();
