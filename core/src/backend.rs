@@ -40,6 +40,8 @@ pub struct Counted {
     pub near_triangles: u64,
     /// Triangles of payloads submitted.
     pub far_triangles: u64,
+    /// Samples of layered depth images warped.
+    pub samples: u64,
     /// Primitives that reached the clipper, where the device counts them.
     pub clipped_primitives: Option<u64>,
 }
@@ -109,6 +111,7 @@ pub fn validate(block: Block, data: &BlockData<'_>) -> Result<(), Fault> {
                 }
                 Ok(())
             }
+            Part::Layered(l) => layered(l).map_or(Ok(()), bad),
             Part::Mesh(m) | Part::Projected(crate::payload::ProjectedPart { mesh: m, .. }) => {
                 if let Part::Projected(q) = part {
                     if q.views.len() * 3 != m.indices.len() || q.projectors.len() > 32 {
@@ -126,6 +129,25 @@ pub fn validate(block: Block, data: &BlockData<'_>) -> Result<(), Fault> {
             }
         }),
     }
+}
+
+/// What is wrong with a layered depth image.
+fn layered(l: &crate::layered::LayeredPart) -> Option<String> {
+    let (pixels, n) = (u64::from(l.camera.size[0]) * u64::from(l.camera.size[1]), l.samples());
+    if l.counts.len() as u64 != pixels {
+        return Some(format!("{} sample counts for {pixels} pixels", l.counts.len()));
+    }
+    let counted: usize = l.counts.iter().map(|&c| usize::from(c)).sum();
+    if [counted, l.albedo.len(), l.normal.len(), l.object.len()] != [n; 4] {
+        return Some(format!("{n} depths, but {counted} counted samples"));
+    }
+    let [near, far] = l.inverse_depth;
+    if !(near > 0.0 && far > 0.0 && far <= near && near.is_finite()) {
+        return Some(format!("depths from 1 / {near} to 1 / {far}"));
+    }
+    let object = l.object.iter().find(|&&o| usize::from(o) >= l.objects.len());
+    let nothing = l.objects.contains(&0).then(|| "object 0, which means nothing hit".to_owned());
+    object.map(|o| format!("object {o} of {}", l.objects.len())).or(nothing)
 }
 
 /// Makes every chunk of the scene resident; returns the bytes taken.

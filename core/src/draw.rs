@@ -63,7 +63,8 @@ pub enum DrawWhat {
         id: PayloadRef,
         /// The index of the part.
         part: u16,
-        /// What the object plane says of its pixels: object number + 1, never 0.
+        /// What the object plane says of its pixels: object number + 1, never 0. The samples of a layered part have their own:
+        /// 0 there.
         object: u32,
     },
 }

@@ -21,6 +21,7 @@ pub mod draw;
 pub mod fault;
 pub mod id;
 pub mod image;
+pub mod layered;
 pub mod mesh;
 pub mod octree;
 pub mod path;

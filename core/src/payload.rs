@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Aabb;
 use crate::id::LocalPayload;
+use crate::layered::LayeredPart;
 
 /// The unit of loading: a bundle of parts that come and go together. Positions in its parts are relative to `origin`, so
 /// that they keep their precision wherever the payload stands.
@@ -27,6 +28,8 @@ pub enum Part {
     Projected(ProjectedPart),
     /// Texels for projected parts.
     Atlas(AtlasPart),
+    /// A layered depth image, warped to the eye.
+    Layered(LayeredPart),
 }
 
 /// Triangles with an albedo and a normal a vertex.
@@ -121,17 +124,23 @@ impl Payload {
             .map(|p| match p {
                 Part::Mesh(m) => m.indices.len() as u64 / 3,
                 Part::Projected(m) => m.mesh.indices.len() as u64 / 3,
-                Part::Atlas(_) => 0,
+                Part::Atlas(_) | Part::Layered(_) => 0,
             })
             .sum()
     }
 
-    /// Bytes of its texels.
+    /// Samples of its layered depth images.
+    pub fn samples(&self) -> u64 {
+        self.parts.iter().map(|p| if let Part::Layered(l) = p { l.samples() as u64 } else { 0 }).sum()
+    }
+
+    /// Bytes of its texels and samples.
     pub fn texture_bytes(&self) -> u64 {
         self.parts
             .iter()
             .map(|p| match p {
                 Part::Atlas(a) => 4 * (a.albedo.len() + a.normal.len()) as u64,
+                Part::Layered(l) => l.bytes(),
                 _ => 0,
             })
             .sum()

@@ -14,13 +14,16 @@ use farfield_core::scene::Scene;
 use crate::block::Ready;
 use crate::frame::{Blocks, Frame};
 use crate::tables::Tables;
-use crate::{light, paint};
+use crate::warp::SplatOrder;
+use crate::{light, paint, warp};
 
 /// How the backend works.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CpuOptions {
     /// Threads of a pool of its own; `None` for the pool that the caller is in. Pictures do not depend on it.
     pub threads: Option<usize>,
+    /// How the samples of a layered depth image hide each other.
+    pub splats: SplatOrder,
 }
 
 /// What a target holds.
@@ -36,6 +39,7 @@ pub struct CpuBackend {
     blocks: Blocks,
     targets: BTreeMap<TargetId, Target>,
     pool: Option<rayon::ThreadPool>,
+    splats: SplatOrder,
 }
 
 impl CpuBackend {
@@ -47,7 +51,14 @@ impl CpuBackend {
         let pool = options.threads.map(|n| rayon::ThreadPoolBuilder::new().num_threads(n.max(1)).build()).transpose();
         let pool = pool.map_err(|e| Fault::Device { device: "cpu".into(), cause: e.to_string() })?;
         let info = DeviceInfo { backend: "cpu".into(), device: device(), degraded: vec![] };
-        Ok(Self { info, tables: Tables::new(scene), blocks: Blocks::new(), targets: BTreeMap::new(), pool })
+        Ok(Self {
+            info,
+            tables: Tables::new(scene),
+            blocks: Blocks::new(),
+            targets: BTreeMap::new(),
+            pool,
+            splats: options.splats,
+        })
     }
 
     /// Does `work` in the backend's own pool, where it has one.
@@ -65,7 +76,12 @@ impl CpuBackend {
                 let frame = Frame::of_draws(pass.camera.eye, &pass.draws, &self.tables, &self.blocks)?;
                 counted.near_triangles += frame.near_triangles;
                 counted.far_triangles += frame.far_triangles;
-                Target::Surface(Self::within(pool, || paint::surface(&frame, &pass.camera, true)))
+                counted.samples += frame.images.iter().map(|(_, i)| i.samples() as u64).sum::<u64>();
+                let mut image = Self::within(pool, || paint::surface(&frame, &pass.camera, true));
+                for (origin, part) in &frame.images {
+                    warp::over(&mut image, &pass.camera, *origin, part, self.splats);
+                }
+                Target::Surface(image)
             }
             PassKind::Shade { surface, shading } => {
                 let Some(Target::Surface(s)) = self.targets.get(surface) else {

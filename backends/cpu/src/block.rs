@@ -4,6 +4,7 @@ use farfield_core::Fault;
 use farfield_core::backend::{BlockData, validate};
 use farfield_core::bvh::TriangleBvh;
 use farfield_core::id::Block;
+use farfield_core::layered::LayeredPart;
 use farfield_core::mesh::ChunkMesh;
 use farfield_core::payload::{AtlasPart, MeshPart, Part, Projector};
 use glam::{DVec3, Vec2, Vec3};
@@ -23,6 +24,7 @@ pub(crate) enum ReadyPart {
     Mesh { surface: Surface, two_sided: bool },
     Projected { surface: Surface, two_sided: bool, views: Vec<u32>, projectors: Vec<Projector> },
     Atlas(AtlasPart),
+    Layered(LayeredPart),
 }
 
 /// A block.
@@ -88,6 +90,7 @@ impl Ready {
                             projectors: q.projectors.clone(),
                         },
                         Part::Atlas(a) => ReadyPart::Atlas(a.clone()),
+                        Part::Layered(l) => ReadyPart::Layered(l.clone()),
                     })
                     .collect(),
             },
@@ -106,6 +109,7 @@ impl Ready {
                         surface.bytes() + size_of_val(&views[..]) + size_of_val(&projectors[..])
                     }
                     ReadyPart::Atlas(a) => size_of_val(&a.albedo[..]) + size_of_val(&a.normal[..]),
+                    ReadyPart::Layered(l) => l.bytes() as usize,
                 })
                 .sum(),
         };

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use farfield_core::bvh::BoxBvh;
 use farfield_core::draw::{Draw, DrawWhat};
 use farfield_core::id::{Block, MeshChunkId, PayloadRef};
+use farfield_core::layered::LayeredPart;
 use farfield_core::payload::{AtlasPart, Projector};
 use farfield_core::scene::{ChunkSet, Texture};
 use farfield_core::{Aabb, Fault};
@@ -55,6 +56,8 @@ pub(crate) struct Frame<'a> {
     pub(crate) spaces: Vec<Space>,
     pub(crate) instances: Vec<Instance<'a>>,
     pub(crate) top: BoxBvh,
+    /// Layered depth images, each with where its payload stands.
+    pub(crate) images: Vec<(DVec3, &'a LayeredPart)>,
     /// Triangles of original geometry and of payloads.
     pub(crate) near_triangles: u64,
     pub(crate) far_triangles: u64,
@@ -139,6 +142,16 @@ impl<'a> Frame<'a> {
         let Some(Ready::Payload { origin, parts }) = blocks.get(&Block::Payload(id)).map(|b| &**b) else {
             return Err(missing(Block::Payload(id)));
         };
+        if let Some(ReadyPart::Layered(image)) = parts.get(part as usize) {
+            if object != 0 {
+                return Err(Fault::Refused(format!("part {part} of {id:?}: the samples have objects of their own")));
+            }
+            self.images.push((*origin, image));
+            return Ok(());
+        }
+        if object == 0 {
+            return Err(Fault::Refused(format!("part {part} of {id:?}: object 0 means nothing hit")));
+        }
         let (surface, two_sided, paint) = match parts.get(part as usize) {
             Some(ReadyPart::Mesh { surface, two_sided }) => (surface, *two_sided, Paint::Vertices),
             Some(ReadyPart::Projected { surface, two_sided, views, projectors }) => {
@@ -148,7 +161,9 @@ impl<'a> Frame<'a> {
             Some(ReadyPart::Atlas(_)) => {
                 return Err(Fault::Refused(format!("part {part} of {id:?} is an atlas and cannot be drawn")));
             }
-            None => return Err(Fault::Refused(format!("{id:?} has no part {part}, only {}", parts.len()))),
+            Some(ReadyPart::Layered(_)) | None => {
+                return Err(Fault::Refused(format!("{id:?} has no part {part}, only {}", parts.len())));
+            }
         };
         self.far_triangles += surface.indices.len() as u64 / 3;
         let Some(bounds) = surface.bvh.bounds() else { return Ok(()) };

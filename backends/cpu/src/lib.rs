@@ -21,6 +21,8 @@ mod paint;
 mod tables;
 mod texel;
 mod trace;
+mod warp;
 
 pub use backend::{CpuBackend, CpuOptions};
 pub use capture::CpuCapture;
+pub use warp::SplatOrder;

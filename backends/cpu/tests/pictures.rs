@@ -58,7 +58,8 @@ fn camera(scene: &Scene, size: [u32; 2]) -> Camera {
 }
 
 fn backend(scene: &Scene, threads: usize) -> CpuBackend {
-    let mut b = CpuBackend::new(scene, CpuOptions { threads: Some(threads) }).expect("a backend");
+    let mut b =
+        CpuBackend::new(scene, CpuOptions { threads: Some(threads), ..CpuOptions::default() }).expect("a backend");
     upload_scene(&mut b, scene).expect("the scene is uploaded");
     b
 }

@@ -154,6 +154,7 @@ impl Residency {
                     }
                     Ok(PartSlot::Atlas { empty: a.albedo.is_empty() })
                 }
+                Part::Layered(_) => Err(Fault::Refused(format!("{block:?}: GPU backends draw no layered depth image"))),
             };
             match slot {
                 Ok(slot) => made.parts.push(slot),

@@ -214,7 +214,7 @@ impl Backend for WgpuBackend {
             None => (None, None),
         };
         let (near_triangles, far_triangles) = (plan.near_triangles, plan.far_triangles);
-        Ok(Counted { gpu_ms, wall_ms, near_triangles, far_triangles, clipped_primitives })
+        Ok(Counted { gpu_ms, wall_ms, near_triangles, far_triangles, samples: 0, clipped_primitives })
     }
 
     fn read_surface(&mut self, target: TargetId) -> Result<SurfaceImage, Fault> {
