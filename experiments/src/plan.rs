@@ -3,6 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use farfield_core::Camera;
+use farfield_core::cell::Split;
 use farfield_core::context::{Context, Forget};
 use farfield_core::strategy::{Covers, LeftOut};
 use serde::Serialize;
@@ -45,7 +46,7 @@ pub struct PipelinePlan {
     pub frames_outside_cells: usize,
     /// Whether building takes pictures.
     pub captures: bool,
-    /// Original triangles near a visited cell: mean and largest.
+    /// Original triangles near a visited cell, or its partition's budget for a frame where there is one: mean and largest.
     pub near_triangles_mean: f64,
     /// The largest of them.
     pub near_triangles_max: u64,
@@ -87,14 +88,16 @@ fn of_pipeline(
         let needs = p.far_field.needs(scene, Some(&cell)).map_err(refused)?;
         left_out.extend(needs.left_out.iter().cloned());
         captures |= needs.captures && needs.cell_asset;
-        let far = &cell.splits[0].far;
-        let is_near =
-            if needs.covers == Covers::Far { scene.triangles() - scene.triangles_of(far) } else { scene.triangles() };
-        near.push(is_near);
+        let of_split = |s: &Split| match needs.covers {
+            Covers::Far => s.near_budget.unwrap_or_else(|| scene.triangles() - scene.triangles_of(&s.far)),
+            Covers::Everything => scene.triangles(),
+        };
+        near.push(cell.splits.iter().map(of_split).max().unwrap_or(0));
         if needs.cell_asset {
             cells_built += 1;
             if needs.captures {
-                texels += texels_of(prepared, far, cell.outline.centre.as_dvec3());
+                let centre = cell.outline.centre.as_dvec3();
+                texels += cell.splits.iter().map(|s| texels_of(prepared, &s.far, centre)).sum::<u64>();
             }
         }
     }

@@ -71,7 +71,7 @@ pub struct PipelineSummary {
     pub frame_ms_source: String,
     /// Triangles a frame.
     pub triangles: TriangleCounts,
-    /// Points a frame.
+    /// Points a frame: samples of layered depth images.
     pub points: MeanMax,
     /// Texels resident, bytes, at most.
     pub texture_bytes: u64,
@@ -80,7 +80,8 @@ pub struct PipelineSummary {
     /// Frames whose eye was in no cell: plain geometry was drawn.
     pub frames_outside_cells: usize,
     /// Original triangles over triangles drawn in a cell, near and far together, not culled to the frustum; mean over the
-    /// frames' cells. The papers' "simplified : original" is 1 over this. 0 where nothing is simplified.
+    /// frames' cells. The papers' "simplified : original" is 1 over this. 0 where nothing is simplified, or where what is far depends on
+    /// the view's direction.
     pub original_over_simplified: f64,
     /// Error over the measured frames; `None` for the reference itself.
     pub error: Option<ErrorSummary>,
@@ -93,7 +94,7 @@ pub struct PipelineSummary {
 /// What building cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Preprocess {
-    /// Wall time of this run's build, seconds: 0 where all was in the store.
+    /// Time of this run's building, seconds: 0 where all was in the store. On demand: the sum over the walk.
     pub seconds: f64,
     /// Cells built in this run.
     pub cells_built: usize,
@@ -210,6 +211,8 @@ pub struct FrameRow {
     pub near_triangles: u64,
     /// Payload triangles.
     pub far_triangles: u64,
+    /// Samples of layered depth images.
+    pub points: u64,
     /// Far blocks that were not resident.
     pub missing_blocks: u32,
     /// Texels resident, bytes.

@@ -14,7 +14,7 @@ use farfield_core::scene::Scene;
 
 use crate::audit::{self, Measured};
 use crate::build::{self, Built, Division, NoCapture, Site};
-use crate::config::{BackendName, BudgetSettings, Experiment, Pipeline, to_toml};
+use crate::config::{BackendName, BudgetSettings, BuildWhen, Experiment, Pipeline, to_toml};
 use crate::failure::Failure;
 use crate::floor::floor;
 use crate::gallery::Gallery;
@@ -25,7 +25,7 @@ use crate::results::{
     BoundAudit, FrameRow, Machine, MeanMax, PipelineSummary, SCHEMA, SceneFacts, Summary, Times, TriangleCounts,
 };
 use crate::store::Store;
-use crate::walk::{Device, Opened, References, Tour, Walked, Walker, device, frame};
+use crate::walk::{Device, OnDemand, Opened, References, Tour, Walked, Walker, device, frame};
 use crate::{path, scene};
 
 /// Seed of the audits' viewpoints: fixed, so that runs compare.
@@ -117,15 +117,21 @@ pub fn build_pipelines(
 ) -> Result<Vec<Built>, Failure> {
     let capture = captures(experiment, prepared, which)?;
     let progress = Progress::new(options.quiet);
-    let site = Site {
-        scene: &prepared.scene,
-        views: &prepared.views,
-        store,
-        capture: &*capture,
-        cancel: options.cancel,
-        progress: &progress,
-    };
+    let site = prepared.site(store, &*capture, options.cancel, &progress);
     which.iter().map(|&i| site.build(&experiment.pipelines[i], &prepared.divisions[i])).collect()
+}
+
+impl Prepared {
+    /// Where things are built.
+    pub fn site<'a>(
+        &'a self,
+        store: &'a Store,
+        capture: &'a dyn Capture,
+        cancel: &'a AtomicBool,
+        progress: &'a Progress,
+    ) -> Site<'a> {
+        Site { scene: &self.scene, views: &self.views, store, capture, cancel, progress }
+    }
 }
 
 /// `build`: preprocessing only; what it did, in lines.
@@ -163,7 +169,11 @@ pub fn run(experiment: &Experiment, out: &Path, options: &Options<'_>) -> Result
     let prepared = prepare(experiment, options)?;
     let store = open_store(options)?;
     let all: Vec<usize> = (0..experiment.pipelines.len()).collect();
-    let built = build_pipelines(experiment, &prepared, &all, &store, options)?;
+    let capture = captures(experiment, &prepared, &all)?;
+    let progress = Progress::new(options.quiet);
+    let site = prepared.site(&store, &*capture, options.cancel, &progress);
+    let build = |&i: &usize| site.build(&experiment.pipelines[i], &prepared.divisions[i]);
+    let mut built: Vec<Option<Built>> = all.iter().map(|i| build(i).map(Some)).collect::<Result<_, _>>()?;
 
     let io = |e: std::io::Error| Failure::work(format!("results cannot be written to {}", out.display()), e);
     std::fs::create_dir_all(out.join("frames")).map_err(io)?;
@@ -178,8 +188,9 @@ pub fn run(experiment: &Experiment, out: &Path, options: &Options<'_>) -> Result
             v.insert(Device::new(device::open(backends[i], &prepared.scene)?));
         }
         let device = devices.get_mut(&backends[i]).ok_or(Failure::Cancelled)?;
-        let one = One { experiment, prepared: &prepared, built: &built[i], store: &store, options, index: i };
-        done.insert(i, one.walk(device, &references, &mut gallery)?);
+        let one = One { experiment, prepared: &prepared, site: &site, options, index: i };
+        let built = built[i].take().ok_or(Failure::Cancelled)?;
+        done.insert(i, one.walk(built, device, &references, &mut gallery)?);
     }
     let rows: Vec<FrameRow> = done.values().flat_map(|d| d.1.clone()).collect();
     let summary = summary(experiment, &prepared, done.into_values().map(|d| d.0).collect());
@@ -214,8 +225,7 @@ fn summary(experiment: &Experiment, prepared: &Prepared, pipelines: Vec<Pipeline
 struct One<'a> {
     experiment: &'a Experiment,
     prepared: &'a Prepared,
-    built: &'a Built,
-    store: &'a Store,
+    site: &'a Site<'a>,
     options: &'a Options<'a>,
     index: usize,
 }
@@ -231,6 +241,7 @@ impl One<'_> {
 
     fn walk(
         &self,
+        built: Built,
         device: &mut Device,
         references: &References,
         gallery: &mut Gallery,
@@ -238,7 +249,9 @@ impl One<'_> {
         let (e, p) = (self.experiment, self.prepared);
         let name = &self.pipeline().name;
         let division = &p.divisions[self.index];
-        let opened = Opened::new(self.pipeline(), division, self.built, &p.scene, self.store)?;
+        let opened = Opened::new(self.pipeline(), division, built, &p.scene, self.site.store)?;
+        let on_demand =
+            (self.pipeline().build == BuildWhen::OnDemand).then(|| OnDemand::new(self.site, e.build.on_demand_ms));
         let tour = Tour {
             scene: &p.scene,
             views: &p.views,
@@ -250,7 +263,7 @@ impl One<'_> {
         // What others are compared with may not lack anything.
         let budget = if self.is_reference() { BudgetSettings::default() } else { e.budget.clone() };
         let info = device.backend.info().clone();
-        let mut walker = Walker::new(&tour, &opened, device, &budget);
+        let mut walker = Walker::new(&tour, opened, on_demand, device, &budget);
         let metrics = Metrics { ssim: e.measure.ssim, flip: e.measure.flip };
         let (mut walked, mut rows, mut errors): (Vec<Walked>, Vec<FrameRow>, Vec<FrameErrors>) =
             (vec![], vec![], vec![]);
@@ -283,14 +296,14 @@ impl One<'_> {
         let of = |pick: fn(&Walked) -> u64| MeanMax::of(walked.iter().map(|w| pick(w) as f64));
         let times: Vec<f64> = walked.iter().map(|w| w.frame_ms).collect();
         let ratios: Vec<f64> =
-            walked.iter().filter_map(|w| w.cell).map(|c| opened.original_over_simplified(c)).collect();
-        drop(walker);
+            walked.iter().filter_map(|w| w.cell).map(|c| walker.opened.original_over_simplified(c)).collect();
+        let Built { preprocess, left_out, .. } = walker.opened.built;
         let floor = floor(&mut *device.backend, &p.views, &p.shading, FLOOR_FRAMES).map_err(failed(p.cameras.len()))?;
         let summary = PipelineSummary {
             name: name.clone(),
             strategies: serde_json::Value::Object(self.pipeline().resolved.clone()),
             device: info,
-            preprocess: self.built.preprocess,
+            preprocess,
             frame_ms: Times::of(&times),
             floor_ms: floor.p50,
             frame_ms_source: if walked.iter().all(|w| w.by_gpu) { "gpu timestamps" } else { "wall clock" }.into(),
@@ -300,14 +313,14 @@ impl One<'_> {
                 shadow: MeanMax::default(),
                 total: of(|w| w.near_triangles + w.far_triangles),
             },
-            points: MeanMax::default(),
+            points: of(|w| w.samples),
             texture_bytes: walked.iter().map(|w| w.texture_bytes).max().unwrap_or(0),
             resident_bytes: walked.iter().map(|w| w.resident_bytes).max().unwrap_or(0),
             frames_outside_cells: walked.iter().filter(|w| w.cell.is_none()).count(),
             original_over_simplified: MeanMax::of(ratios).mean,
             error: (!self.is_reference()).then(|| measure::summary(&errors)),
             bounds: self.bounds(&measured),
-            left_out: self.built.left_out.clone(),
+            left_out,
         };
         Ok((summary, rows))
     }
@@ -332,6 +345,7 @@ fn row(pipeline: &str, frame: usize, w: &Walked) -> FrameRow {
         frame_ms: w.frame_ms,
         near_triangles: w.near_triangles,
         far_triangles: w.far_triangles,
+        points: w.samples,
         missing_blocks: w.missing,
         texture_bytes: w.texture_bytes,
         ..FrameRow::default()
@@ -372,10 +386,17 @@ pub fn render(
     let division = &mut prepared.divisions[i];
     division.needed = division.path[number].into_iter().collect();
     let store = open_store(options)?;
-    let built = build_pipelines(experiment, &prepared, &[i], &store, options)?;
-    let opened = Opened::new(&experiment.pipelines[i], &prepared.divisions[i], &built[0], &prepared.scene, &store)?;
+    let pipeline_at = &experiment.pipelines[i];
+    let capture = captures(experiment, &prepared, &[i])?;
+    let progress = Progress::new(options.quiet);
+    let site = prepared.site(&store, &*capture, options.cancel, &progress);
+    let built = site.build(pipeline_at, &prepared.divisions[i])?;
+    let mut opened = Opened::new(pipeline_at, &prepared.divisions[i], built, &prepared.scene, &store)?;
     let mut device = Device::new(device::open(backends[0], &prepared.scene)?);
     let failed = |f| Failure::during(format!("pipeline \"{pipeline}\", frame {number}"), f);
+    if pipeline_at.build == BuildWhen::OnDemand {
+        OnDemand::new(&site, f64::INFINITY).serve(&mut opened, &camera).map_err(failed)?;
+    }
     let rendered = render_at(&opened, &mut device, &prepared, &camera).map_err(failed)?;
     Ok((camera, rendered))
 }

@@ -66,10 +66,11 @@ impl Lab {
     /// What building and opening say.
     pub fn with<R>(&self, pipeline: usize, f: impl FnOnce(&Opened<'_>) -> R) -> Result<R, String> {
         let options = options(self.store.root());
-        let built = run::build_pipelines(&self.experiment, &self.prepared, &[pipeline], &self.store, &options)
+        let mut built = run::build_pipelines(&self.experiment, &self.prepared, &[pipeline], &self.store, &options)
             .map_err(|f| told(&f))?;
         let (p, division) = (&self.experiment.pipelines[pipeline], &self.prepared.divisions[pipeline]);
-        let opened = Opened::new(p, division, &built[0], &self.prepared.scene, &self.store).map_err(|f| told(&f))?;
+        let opened =
+            Opened::new(p, division, built.remove(0), &self.prepared.scene, &self.store).map_err(|f| told(&f))?;
         Ok(f(&opened))
     }
 

@@ -92,6 +92,7 @@ fn audit(lab: &Lab, pipeline: usize, told: &dyn Fn(&Claim) -> f64) -> Vec<Measur
             scene: &lab.prepared.scene,
             views: &lab.prepared.views,
             cell: &opened.built.cells[&id].cell,
+            cells: &*opened.division.cells,
             asset: asset.unwrap(),
             claims: &claims,
             draws: &draws,

@@ -5,7 +5,7 @@
 //! turns the object to a random place of its picture (so the stretch towards the picture's corners is in it). A pixel is
 //! the measurement's resolution: a slit of any width may catch one row of pixel centres, so that a violation is a measured
 //! width of more than the claim plus one pixel. *Near triangles* are counted by culling, with the four side planes, every
-//! placed chunk that the cell's first split calls near. Samples can refute a bound, not prove it.
+//! placed chunk that the view's split calls near, for views that the cell serves. Samples can refute a bound, not prove it.
 
 use std::collections::BTreeMap;
 
@@ -16,6 +16,7 @@ use farfield_core::claim::{Claim, Quantity};
 use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind};
 use farfield_core::id::{AssetId, LocalPayload, ObjectId, TargetId};
 use farfield_core::scene::{ChunkSet, Scene};
+use farfield_core::strategy::Cells;
 use farfield_core::{Aabb, Camera, Fault};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -27,6 +28,9 @@ use crate::results::{BoundAudit, percentile};
 const REFERENCE: TargetId = TargetId(u32::MAX - 1);
 const CANDIDATE: TargetId = TargetId(u32::MAX - 2);
 
+/// Cells may overlap: how many random cameras of a region are tried for one that its cell serves.
+const SERVED_TRIES: usize = 64;
+
 /// One built cell with what is claimed of it.
 pub struct CellAudit<'a> {
     /// The scene; all of it and the cell's payloads are resident in the backend.
@@ -35,6 +39,8 @@ pub struct CellAudit<'a> {
     pub views: &'a ViewModel,
     /// The cell.
     pub cell: &'a Cell,
+    /// All cells: they say which one serves a camera, and what the camera uses of it.
+    pub cells: &'a dyn Cells,
     /// The cell's opened asset.
     pub asset: AssetId,
     /// What its far field claims.
@@ -125,22 +131,25 @@ impl CellAudit<'_> {
         by.into_iter().filter_map(object).collect()
     }
 
-    /// A camera of the view model at a random viewpoint, with `target` at a random place of its picture; the picture cut
-    /// down to the target's box. `None` when the target lies beside the picture.
-    fn aimed(&self, target: Aabb, rng: &mut impl Rng) -> Option<Camera> {
+    /// A camera of the view model at a random viewpoint, with `target` at a random place of its picture, and the same with the
+    /// picture cut down to the target's box. `None` when the target lies beside the picture or another cell serves the camera.
+    fn aimed(&self, target: Aabb, rng: &mut impl Rng) -> Option<(Camera, Camera)> {
         let eye = self.cell.outline.region.sample(std::array::from_fn(|_| rng.random()))?.as_dvec3();
         let to = (target.centre().as_dvec3() - eye).as_vec3();
         let spread = |fov: f32, r: f32| (r - 0.5) * 0.9 * fov;
         let yaw = (-to.x).atan2(-to.z) + spread(self.views.fov_x_rad(), rng.random());
         let pitch = to.y.atan2(to.x.hypot(to.z)) + spread(self.views.fov_y_rad, rng.random());
         let pitch = pitch.clamp(self.views.pitch_rad[0], self.views.pitch_rad[1]);
-        crop(&self.views.camera(eye, yaw, pitch), &target)
+        let whole = self.views.camera(eye, yaw, pitch);
+        (self.cells.find(&whole) == Some(self.cell.outline.id)).then_some(())?;
+        Some((whole, crop(&whole, &target)?))
     }
 
     fn hole_width(&self, backend: &mut dyn Backend, o: &Object, rng: &mut impl Rng) -> Result<Option<f64>, Fault> {
-        let Some(camera) = self.aimed(o.bounds, rng) else { return Ok(None) };
+        let Some((whole, camera)) = self.aimed(o.bounds, rng) else { return Ok(None) };
         let own = ChunkSet::from_range(self.scene.objects[o.id.index()].chunks.clone());
-        let far = own.intersection(&self.cell.splits[0].far);
+        let split = self.cells.active(self.cell, &whole).split;
+        let far = own.intersection(&self.cell.splits[split.index()].far);
         let of_object = |mut d: Draw| {
             match &mut d.what {
                 DrawWhat::Payload { object, .. } if *object != o.id.0 + 1 => return None,
@@ -150,18 +159,26 @@ impl CellAudit<'_> {
             Some(d)
         };
         let reference = vec![Draw { what: DrawWhat::Chunks(far), bounds: o.bounds, error_px: 0.0 }];
-        let candidate: Vec<Draw> = (self.draws)(&camera).into_iter().filter_map(of_object).collect();
+        let candidate: Vec<Draw> = (self.draws)(&whole).into_iter().filter_map(of_object).collect();
         let pass = |writes, draws| Pass { kind: PassKind::Surface, camera, writes, draws };
         backend.render(&DrawList { passes: vec![pass(REFERENCE, reference), pass(CANDIDATE, candidate)] })?;
         let (r, c) = (backend.read_surface(REFERENCE)?, backend.read_surface(CANDIDATE)?);
         Ok(Some(hole_width_px(&hole_mask(&r, &c), r.size)))
     }
 
-    fn near_triangles(&self, rng: &mut impl Rng) -> Option<f64> {
+    /// A random camera of the view model in the cell's region; `None` where another cell serves it.
+    fn served(&self, rng: &mut impl Rng) -> Option<Camera> {
         let eye = self.cell.outline.region.sample(std::array::from_fn(|_| rng.random()))?.as_dvec3();
-        let pitch = self.views.pitch_rad[0] + (self.views.pitch_rad[1] - self.views.pitch_rad[0]) * rng.random::<f32>();
-        let camera = self.views.camera(eye, std::f32::consts::TAU * rng.random::<f32>(), pitch);
-        let near = self.cell.splits[0].far.complement(self.scene.chunks.len() as u32);
+        let [low, high] = self.views.pitch_rad;
+        let (yaw, pitch) = (std::f32::consts::TAU * rng.random::<f32>(), low + (high - low) * rng.random::<f32>());
+        let camera = self.views.camera(eye, yaw, pitch);
+        (self.cells.find(&camera) == Some(self.cell.outline.id)).then_some(camera)
+    }
+
+    fn near_triangles(&self, rng: &mut impl Rng) -> Option<f64> {
+        let camera = (0..SERVED_TRIES).find_map(|_| self.served(rng))?;
+        let split = self.cells.active(self.cell, &camera).split;
+        let near = self.cell.splits[split.index()].far.complement(self.scene.chunks.len() as u32);
         Some(self.scene.triangles_of(&self.scene.cull(&near, &camera)) as f64)
     }
 }

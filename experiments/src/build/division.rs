@@ -10,7 +10,7 @@ use farfield_core::scene::Scene;
 use farfield_core::strategy::{Cells, LeftOut};
 
 use super::{NoCapture, Pool};
-use crate::config::Pipeline;
+use crate::config::{BuildWhen, Pipeline};
 use crate::failure::Failure;
 
 /// A pipeline's cells and the path through them.
@@ -60,5 +60,17 @@ impl Division {
             out.push(plan("far field outside cells", reason));
         }
         out
+    }
+}
+
+impl BuildWhen {
+    /// What is not built ahead of the walk.
+    pub(super) fn left_out(self, division: &Division) -> Option<LeftOut> {
+        let reason = || format!("{} visited cells are built on demand, when they are wanted", division.needed.len());
+        (self == Self::OnDemand).then(|| LeftOut {
+            stage: "building ahead".into(),
+            reason: reason(),
+            decided: "plan".into(),
+        })
     }
 }

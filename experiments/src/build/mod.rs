@@ -24,7 +24,7 @@ use rayon::prelude::*;
 pub use division::{Division, divide};
 pub use executor::{NoCapture, Pool, capture};
 
-use crate::config::Pipeline;
+use crate::config::{BuildWhen, Pipeline};
 use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::results::Preprocess;
@@ -50,15 +50,15 @@ pub struct Site<'a> {
 pub struct BuiltCell {
     /// Its inside.
     pub cell: Cell,
-    /// Its asset; empty where the far field builds nothing for cells.
-    pub manifest: Manifest,
+    /// Its asset: empty where the far field builds nothing for cells, `None` as long as it is not built.
+    pub manifest: Option<Manifest>,
 }
 
 /// A pipeline, built.
 pub struct Built {
-    /// The scene's asset, where the far field has one.
-    pub shared: Option<Manifest>,
-    /// The needed cells.
+    /// The scene's asset with its key, where the far field has one.
+    pub shared: Option<(Key, Manifest)>,
+    /// The needed cells; none yet where they are built on demand.
     pub cells: BTreeMap<CellId, BuiltCell>,
     /// What the far field draws.
     pub covers: Covers,
@@ -71,6 +71,16 @@ pub struct Built {
 impl Site<'_> {
     fn context<'b>(&'b self, memo: &'b StoreMemo<'b>) -> Context<'b> {
         Context { capture: self.capture, run: &Pool, memo, cancel: self.cancel }
+    }
+
+    /// A cell's inside alone, its far field to be built later.
+    ///
+    /// # Errors
+    /// What the partition gives.
+    pub fn inside_of(&self, pipeline: &Pipeline, division: &Division, id: CellId) -> Result<BuiltCell, Fault> {
+        let memo = self.memo();
+        let (_, cell) = self.inside(pipeline, division, id, &self.context(&memo))?;
+        Ok(BuiltCell { cell, manifest: None })
     }
 
     fn memo(&self) -> StoreMemo<'_> {
@@ -95,13 +105,16 @@ impl Site<'_> {
         let start = Instant::now();
         let scene_needs = pipeline.far_field.needs(self.scene, None).map_err(failed)?;
         let shared = if scene_needs.scene_asset { Some(self.scene_asset(pipeline).map_err(failed)?) } else { None };
-        let bar = self.progress.cells(&pipeline.name, division.needed.len());
-        let made: Vec<Result<(CellId, BuiltCell, Needs, bool), Failure>> = division
-            .needed
+        let needed = match pipeline.build {
+            BuildWhen::Ahead => division.needed.as_slice(),
+            BuildWhen::OnDemand => &[],
+        };
+        let bar = self.progress.cells(&pipeline.name, needed.len());
+        let made: Vec<Result<(CellId, BuiltCell, Needs, bool), Failure>> = needed
             .par_iter()
             .map(|&id| {
                 let of_cell = |f| Failure::during(format!("pipeline \"{}\", cell {}", pipeline.name, id.0), f);
-                let one = self.cell(pipeline, division, id, shared.as_ref()).map_err(of_cell);
+                let one = self.cell(pipeline, division, id, shared.as_ref().map(|s| (s.0, &s.1))).map_err(of_cell);
                 bar.inc();
                 one
             })
@@ -116,12 +129,13 @@ impl Site<'_> {
         for one in made {
             let (id, built, needs, new) = one?;
             note(&needs.left_out);
-            note(&built.manifest.left_out);
+            note(built.manifest.as_ref().map_or(&[], |m| &m.left_out));
             covers = needs.covers;
             cells_built += usize::from(new);
             cells.insert(id, built);
         }
         note(&division.left_out());
+        note(pipeline.build.left_out(division).as_slice());
         let bytes = |m: &Manifest| m.bytes() + m.index.len() as u64;
         let shared_bytes = shared.as_ref().map_or(0, |s| bytes(&s.1));
         let preprocess = Preprocess {
@@ -129,12 +143,12 @@ impl Site<'_> {
             cells_built,
             cells_needed: division.needed.len(),
             cells_total: division.cells.outlines().len(),
-            bytes_stored: cells.values().map(|c| bytes(&c.manifest)).sum::<u64>() + shared_bytes,
+            bytes_stored: cells.values().filter_map(|c| c.manifest.as_ref()).map(bytes).sum::<u64>() + shared_bytes,
             peak_rss_bytes: peak_rss_bytes(),
         };
         let left_out =
             left_out.into_iter().rev().map(|(decided, stage, reason)| LeftOut { stage, reason, decided }).collect();
-        Ok(Built { shared: shared.map(|s| s.1), cells, covers, left_out, preprocess })
+        Ok(Built { shared, cells, covers, left_out, preprocess })
     }
 
     /// The asset with this key, if it is whole: every payload's checksum holds.
@@ -160,12 +174,16 @@ impl Site<'_> {
         Ok((asset, sink.finish(index)?))
     }
 
-    fn cell(
+    /// One cell, with what it needs, and whether it was built just now.
+    ///
+    /// # Errors
+    /// What the stages give.
+    pub fn cell(
         &self,
         pipeline: &Pipeline,
         division: &Division,
         id: CellId,
-        shared: Option<&(Key, Manifest)>,
+        shared: Option<(Key, &Manifest)>,
     ) -> Result<(CellId, BuiltCell, Needs, bool), Fault> {
         let memo = self.memo();
         let cx = self.context(&memo);
@@ -173,7 +191,7 @@ impl Site<'_> {
         let (inside, cell) = self.inside(pipeline, division, id, &cx)?;
         let needs = pipeline.far_field.needs(self.scene, Some(&cell))?;
         if !needs.cell_asset {
-            return Ok((id, BuiltCell { cell, manifest: Manifest::default() }, needs, false));
+            return Ok((id, BuiltCell { cell, manifest: Some(Manifest::default()) }, needs, false));
         }
         let base = self.base("cell asset", &pipeline.resolved["far_field"], pipeline.far_field.version())?;
         let identity = if needs.captures { self.capture.identity() } else { "" };
@@ -181,7 +199,7 @@ impl Site<'_> {
         let shared_key = shared.map_or([0; 32], |s| s.0);
         let asset = key("cell asset", &[&base, &inside, identity.as_bytes(), &outlines, &shared_key]);
         if let Some(manifest) = self.whole(&asset) {
-            return Ok((id, BuiltCell { cell, manifest }, needs, false));
+            return Ok((id, BuiltCell { cell, manifest: Some(manifest) }, needs, false));
         }
         let sink = Recorder::new(self.store, asset);
         let job = CellJob {
@@ -193,7 +211,7 @@ impl Site<'_> {
         };
         let index = pipeline.far_field.bake_cell(&job, &sink, &cx)?;
         let manifest = sink.finish(index)?;
-        Ok((id, BuiltCell { cell, manifest }, needs, true))
+        Ok((id, BuiltCell { cell, manifest: Some(manifest) }, needs, true))
     }
 
     /// A cell's inside, from the store or made, and the hash of its bytes.

@@ -112,6 +112,7 @@ fn pipeline_settings() -> Vec<Setting> {
         doc: doc.into(),
     };
     let backends = [BackendName::Cpu, BackendName::Vulkan, BackendName::Wgpu].map(|b| b.name().to_owned());
+    let when = [BuildWhen::Ahead, BuildWhen::OnDemand].map(|w| w.name().to_owned());
     let of_type = |name: &str| Value::from(Map::from_iter([("type".to_owned(), Value::from(name))]));
     vec![
         one("name", SettingType::Text, Value::Null, true, "what results call it"),
@@ -121,6 +122,13 @@ fn pipeline_settings() -> Vec<Setting> {
             Value::Null,
             false,
             "what draws it; without it what this machine has",
+        ),
+        one(
+            "build",
+            SettingType::Choice(when.into()),
+            Value::from(BuildWhen::Ahead.name()),
+            false,
+            "when its cells are built: ahead of the walk, or on demand within [build] on_demand_ms a frame",
         ),
         one("partition", SettingType::Strategy(Kind::Partition), of_type(DEFAULT_PARTITION), false, "its cells"),
         one("far_field", SettingType::Strategy(Kind::FarField), Value::Null, true, "what stands in for far geometry"),
@@ -204,7 +212,8 @@ fn make(
         let backend = table.get("backend").and_then(|b| serde_json::from_value(b.clone()).ok());
         if let (Some(partition), Some(far_field), Some(scheduler)) = (partition, far_field, scheduler) {
             let (name, resolved) = (name(table), table.clone());
-            pipelines.push(Pipeline { name, backend, partition, far_field, scheduler, resolved });
+            let build = serde_json::from_value(table["build"].clone()).unwrap_or_default();
+            pipelines.push(Pipeline { name, backend, build, partition, far_field, scheduler, resolved });
         }
     }
     resolved.insert("pipeline".into(), tables.into_iter().map(Value::Object).collect());

@@ -209,11 +209,36 @@ impl Default for MeasureSettings {
 pub struct BuildSettings {
     /// What takes the pictures that payloads are made of. Part of every store key.
     pub capture: BackendName,
+    /// Time that pipelines with build = "on-demand" may build for while they walk. What a cell takes beyond it, later frames
+    /// wait for: over a walk the mean holds.
+    #[schemars(range(min = 0), extend("unit" = "ms a frame"))]
+    pub on_demand_ms: f64,
 }
 
 impl Default for BuildSettings {
     fn default() -> Self {
-        Self { capture: BackendName::Cpu }
+        Self { capture: BackendName::Cpu, on_demand_ms: 100.0 }
+    }
+}
+
+/// When a pipeline's cells are built.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BuildWhen {
+    /// Before the walk, those that the path visits.
+    #[default]
+    Ahead,
+    /// During the walk, those that the scheduler asks for, in its order.
+    OnDemand,
+}
+
+impl BuildWhen {
+    /// As experiment files spell it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ahead => "ahead",
+            Self::OnDemand => "on-demand",
+        }
     }
 }
 
@@ -247,6 +272,8 @@ pub struct Pipeline {
     pub name: String,
     /// What draws it; `None`: what this machine has.
     pub backend: Option<BackendName>,
+    /// When its cells are built.
+    pub build: BuildWhen,
     /// Its cells.
     pub partition: Box<dyn Partition>,
     /// Its far field.

@@ -5,9 +5,12 @@
 //! pictures wait in a temporary folder for those that are compared with them.
 
 pub mod device;
+mod on_demand;
 mod opened;
 mod reference;
 mod residency;
+
+use std::cell::RefCell;
 
 use farfield_core::backend::Backend;
 use farfield_core::camera::ViewModel;
@@ -17,6 +20,7 @@ use farfield_core::scene::Scene;
 use farfield_core::strategy::{Motion, Planner};
 use farfield_core::{Camera, Fault};
 
+pub use on_demand::OnDemand;
 pub use opened::{Drawn, Opened, frame};
 pub use reference::References;
 pub use residency::{Device, Residency};
@@ -44,8 +48,10 @@ pub struct Tour<'a> {
 
 /// One pipeline on one device.
 pub struct Walker<'a> {
+    /// What it draws.
+    pub opened: Opened<'a>,
     tour: &'a Tour<'a>,
-    opened: &'a Opened<'a>,
+    on_demand: Option<OnDemand<'a>>,
     device: &'a mut Device,
     residency: Residency,
     planner: Box<dyn Planner>,
@@ -66,6 +72,8 @@ pub struct Walked {
     pub near_triangles: u64,
     /// Payload triangles.
     pub far_triangles: u64,
+    /// Samples of layered depth images.
+    pub samples: u64,
     /// Blocks not there.
     pub missing: u32,
     /// Bytes resident.
@@ -75,15 +83,22 @@ pub struct Walked {
 }
 
 impl<'a> Walker<'a> {
-    /// At the start of the path. A reference gets no budget.
-    pub fn new(tour: &'a Tour<'a>, opened: &'a Opened<'a>, device: &'a mut Device, budget: &BudgetSettings) -> Self {
+    /// At the start of the path. A reference gets no budget. `on_demand` builds what is missing, where cells are not built ahead.
+    pub fn new(
+        tour: &'a Tour<'a>,
+        opened: Opened<'a>,
+        on_demand: Option<OnDemand<'a>>,
+        device: &'a mut Device,
+        budget: &BudgetSettings,
+    ) -> Self {
         device.free_payloads();
         Self {
+            planner: opened.pipeline.scheduler.start(),
             tour,
             opened,
+            on_demand,
             device,
             residency: Residency::new(budget.memory_bytes),
-            planner: opened.pipeline.scheduler.start(),
             upload_bytes_per_frame: budget.upload_bytes_per_frame,
             last: None,
             frames: 0,
@@ -92,7 +107,7 @@ impl<'a> Walker<'a> {
 
     /// Loads what a frame needs: its near chunks, then what the scheduler plans.
     fn load(&mut self, camera: &Camera, cell: Option<CellId>) -> Result<(), Fault> {
-        let (scene, opened) = (self.tour.scene, self.opened);
+        let (scene, opened) = (self.tour.scene, &self.opened);
         let fetch = |b: Block| opened.fetch(b);
         self.residency.tick();
         for c in opened.near(cell, camera).iter() {
@@ -108,8 +123,10 @@ impl<'a> Walker<'a> {
             lights: &[],
             future: self.tour.cameras.get(self.frames + 1..),
         };
-        let wants = Wants { opened, residency: &self.residency };
+        let asked = self.on_demand.as_ref().map(|_| RefCell::default());
+        let wants = Wants { opened, residency: &self.residency, asked };
         let plan = self.planner.plan(&motion, &wants, self.residency.left_for_scheduler());
+        let asked = wants.asked.map(RefCell::into_inner).unwrap_or_default();
         plan.evict.into_iter().for_each(|b| self.residency.release(self.device, b));
         // At least one block a frame, or one that is larger than the limit would never come.
         let mut left = self.upload_bytes_per_frame;
@@ -122,6 +139,9 @@ impl<'a> Walker<'a> {
             self.residency.hold(self.device, block, true, texels, scene, &fetch)?;
             left = left.map(|l| l.saturating_sub(self.residency.bytes.saturating_sub(before)));
         }
+        if let Some(builder) = &mut self.on_demand {
+            builder.build(&mut self.opened, &asked)?;
+        }
         (self.last, self.frames) = (Some(*camera), self.frames + 1);
         Ok(())
     }
@@ -131,6 +151,9 @@ impl<'a> Walker<'a> {
     /// # Errors
     /// What loading and drawing give.
     pub fn step(&mut self, camera: &Camera) -> Result<Walked, Fault> {
+        if let Some(builder) = &self.on_demand {
+            builder.enter(&mut self.opened, camera)?;
+        }
         let cell = self.opened.cell_of(camera);
         self.load(camera, cell)?;
         let residency = &self.residency;
@@ -154,6 +177,7 @@ impl<'a> Walker<'a> {
             by_gpu: best.gpu_ms.is_some(),
             near_triangles: best.near_triangles,
             far_triangles: best.far_triangles,
+            samples: best.samples,
             missing: drawn.missing,
             resident_bytes: self.residency.bytes,
             texture_bytes: self.residency.texture_bytes,
@@ -173,7 +197,7 @@ impl<'a> Walker<'a> {
     /// # Errors
     /// What loading and drawing give.
     pub fn audit(&mut self, views: usize, seed: u64) -> Result<Vec<Measured>, Fault> {
-        let (tour, opened) = (self.tour, self.opened);
+        let (tour, opened) = (self.tour, &self.opened);
         let claims = |id: &CellId| !opened.claims(*id).is_empty() || !opened.built.cells[id].cell.claims.is_empty();
         let cells: Vec<CellId> = opened.built.cells.keys().copied().filter(claims).collect();
         let each = views.div_ceil(cells.len().max(1));
@@ -195,6 +219,7 @@ impl<'a> Walker<'a> {
                 scene: tour.scene,
                 views: tour.views,
                 cell: &opened.built.cells[&id].cell,
+                cells: &*opened.division.cells,
                 asset: asset_of(id),
                 claims: opened.claims(id),
                 draws: &draws,

@@ -1,5 +1,6 @@
 //! A built pipeline, opened for drawing: its far views, and the draws of a frame.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use farfield_core::cell::{Active, Cell};
@@ -8,7 +9,7 @@ use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind, Shading};
 use farfield_core::id::{AssetId, Block, CellId, PayloadRef, TargetId};
 use farfield_core::payload::Payload;
 use farfield_core::scene::{ChunkSet, Scene};
-use farfield_core::strategy::{Candidate, Covers, Demand, DrawBudget, FarView, View};
+use farfield_core::strategy::{Candidate, Covers, Demand, DrawBudget, FarView, LeftOut, View};
 use farfield_core::{Aabb, Camera, Fault};
 
 use super::residency::Residency;
@@ -35,8 +36,8 @@ pub struct Opened<'a> {
     pub pipeline: &'a Pipeline,
     /// Its cells.
     pub division: &'a Division,
-    /// What was built.
-    pub built: &'a Built,
+    /// What was built; grows while walking where cells are built on demand.
+    pub built: Built,
     scene: &'a Scene,
     store: &'a Store,
     views: BTreeMap<CellId, Box<dyn FarView>>,
@@ -60,18 +61,39 @@ impl<'a> Opened<'a> {
     pub fn new(
         pipeline: &'a Pipeline,
         division: &'a Division,
-        built: &'a Built,
+        mut built: Built,
         scene: &'a Scene,
         store: &'a Store,
     ) -> Result<Self, Failure> {
-        let mut views = BTreeMap::new();
-        let shared = built.shared.as_ref().map(|m| (SHARED, m.index.as_slice()));
-        for (&id, cell) in &built.cells {
-            let view = pipeline.far_field.open(shared, (asset_of(id), &cell.manifest.index));
+        let cells = std::mem::take(&mut built.cells);
+        let mut opened = Self { pipeline, division, built, scene, store, views: BTreeMap::new() };
+        for (id, cell) in cells {
             let failed = |f| Failure::during(format!("pipeline \"{}\": opening cell {}", pipeline.name, id.0), f);
-            views.insert(id, view.map_err(failed)?);
+            opened.add(id, cell).map_err(failed)?;
         }
-        Ok(Self { pipeline, division, built, scene, store, views })
+        Ok(opened)
+    }
+
+    /// Adds a cell, or its far field to one that was there without.
+    ///
+    /// # Errors
+    /// What the far field says of the stored bytes.
+    pub(super) fn add(&mut self, id: CellId, cell: BuiltCell) -> Result<(), Fault> {
+        if let Some(manifest) = &cell.manifest {
+            let shared = self.built.shared.as_ref().map(|s| (SHARED, s.1.index.as_slice()));
+            self.views.insert(id, self.pipeline.far_field.open(shared, (asset_of(id), &manifest.index))?);
+        }
+        self.built.cells.insert(id, cell);
+        Ok(())
+    }
+
+    /// Notes what was left out, each once.
+    pub(super) fn note(&mut self, left_out: &[LeftOut]) {
+        for l in left_out {
+            if !self.built.left_out.contains(l) {
+                self.built.left_out.push(l.clone());
+            }
+        }
     }
 
     /// The built cell that serves a camera.
@@ -83,9 +105,9 @@ impl<'a> Opened<'a> {
     pub fn stored(&self, block: Block) -> Option<&Stored> {
         let Block::Payload(p) = block else { return None };
         let manifest: &Manifest = if p.asset == SHARED {
-            self.built.shared.as_ref()?
+            &self.built.shared.as_ref()?.1
         } else {
-            &self.built.cells.get(&CellId(p.asset.0 - 1))?.manifest
+            self.built.cells.get(&CellId(p.asset.0 - 1))?.manifest.as_ref()?
         };
         manifest.payloads.get(&p.id)
     }
@@ -104,23 +126,28 @@ impl<'a> Opened<'a> {
         let of = |asset: AssetId, m: &Manifest| -> Vec<Block> {
             m.payloads.keys().map(|&id| Block::Payload(PayloadRef { asset, id })).collect()
         };
-        let shared = self.built.shared.iter().flat_map(|m| of(SHARED, m));
-        shared.chain(self.built.cells.get(&cell).into_iter().flat_map(|c| of(asset_of(cell), &c.manifest))).collect()
+        let shared = self.built.shared.iter().flat_map(|s| of(SHARED, &s.1));
+        shared.chain(self.manifest(cell).into_iter().flat_map(|m| of(asset_of(cell), m))).collect()
+    }
+
+    /// What is stored of a cell, once it is built.
+    fn manifest(&self, cell: CellId) -> Option<&Manifest> {
+        self.built.cells.get(&cell)?.manifest.as_ref()
     }
 
     /// What the far field claims of a cell.
     pub fn claims(&self, cell: CellId) -> &[Claim] {
-        self.built.cells.get(&cell).map_or(&[], |c| &c.manifest.claims)
+        self.manifest(cell).map_or(&[], |m| &m.claims)
     }
 
-    fn with_view<R>(
-        &self,
-        id: CellId,
-        camera: &Camera,
-        f: impl FnOnce(&dyn FarView, &View<'_>, &Cell) -> R,
-    ) -> Option<R> {
-        let (BuiltCell { cell, .. }, far) = (self.built.cells.get(&id)?, self.views.get(&id)?);
-        let at: Active = self.division.cells.active(cell, camera);
+    /// A cell, and what a camera uses of it.
+    pub fn active(&self, id: CellId, camera: &Camera) -> Option<(&Cell, Active)> {
+        let cell = &self.built.cells.get(&id)?.cell;
+        Some((cell, self.division.cells.active(cell, camera)))
+    }
+
+    fn with_view<R>(&self, id: CellId, camera: &Camera, f: impl FnOnce(&dyn FarView, &View<'_>) -> R) -> Option<R> {
+        let ((cell, at), far) = (self.active(id, camera)?, self.views.get(&id)?);
         // Half a pixel, at a box's nearest point: tolerance = distance / (2 px_per_tan).
         let half_px = |b: &Aabb| 0.5 * b.distance(camera.eye.as_vec3()) / camera.px_per_tan();
         let view = View {
@@ -131,18 +158,16 @@ impl<'a> Opened<'a> {
             budget: DrawBudget::default(),
             cell: Some(cell),
         };
-        Some(f(&**far, &view, cell))
+        Some(f(&**far, &view))
     }
 
     /// The near chunks that a frame draws beside its far field, culled to the camera; all that it may see where the camera
     /// is in no cell.
     pub fn near(&self, cell: Option<CellId>, camera: &Camera) -> ChunkSet {
         let scene = self.scene;
-        let near = cell.and_then(|id| {
-            self.with_view(id, camera, |_, view, cell| match self.built.covers {
-                Covers::Everything => ChunkSet::default(),
-                Covers::Far => cell.splits[view.at.split.index()].far.complement(scene.chunks.len() as u32),
-            })
+        let near = cell.and_then(|id| self.active(id, camera)).map(|(cell, at)| match self.built.covers {
+            Covers::Everything => ChunkSet::default(),
+            Covers::Far => cell.splits[at.split.index()].far.complement(scene.chunks.len() as u32),
         });
         scene.cull(&near.unwrap_or_else(|| scene.all_chunks()), camera)
     }
@@ -158,8 +183,10 @@ impl<'a> Opened<'a> {
             draws.push(Draw { what: DrawWhat::Chunks(there), bounds: self.scene.bounds, error_px: 0.0 });
         }
         if let Some(id) = cell {
-            let achieved = self.with_view(id, camera, |far, view, _| far.draw(resident, view, &mut draws));
-            missing += achieved.unwrap_or_default().missing;
+            let achieved = self.with_view(id, camera, |far, view| far.draw(resident, view, &mut draws).missing);
+            // A cell that is not built yet lacks what its windows show.
+            let windows = || self.active(id, camera).map_or(0, |(_, at)| at.sectors.len() as u32);
+            missing += achieved.unwrap_or_else(windows);
         }
         Drawn { cell, draws, missing }
     }
@@ -167,15 +194,17 @@ impl<'a> Opened<'a> {
     /// What a cell's far field alone draws, all of it resident.
     pub fn far_draws(&self, cell: CellId, camera: &Camera) -> Vec<Draw> {
         let mut draws = vec![];
-        self.with_view(cell, camera, |far, view, _| far.draw(&|_| true, view, &mut draws));
+        self.with_view(cell, camera, |far, view| far.draw(&|_| true, view, &mut draws));
         draws
     }
 
-    /// Original triangles over triangles that a cell draws, not culled to any frustum; 0 where nothing is simplified.
+    /// Original triangles over triangles that a cell draws, not culled to any frustum; 0 where nothing is simplified, or where
+    /// what is far depends on the view's direction.
     pub fn original_over_simplified(&self, cell: CellId) -> f64 {
-        let Some(BuiltCell { cell, manifest }) = self.built.cells.get(&cell) else { return 0.0 };
+        let Some(BuiltCell { cell, manifest: Some(manifest) }) = self.built.cells.get(&cell) else { return 0.0 };
+        let [split] = cell.splits.as_slice() else { return 0.0 };
         let all = self.scene.triangles();
-        let far = self.scene.triangles_of(&cell.splits[0].far);
+        let far = self.scene.triangles_of(&split.far);
         let simplified = manifest.triangles();
         if self.built.covers == Covers::Everything || manifest.payloads.is_empty() {
             return 0.0;
@@ -201,6 +230,8 @@ pub(super) struct Wants<'a> {
     pub(super) opened: &'a Opened<'a>,
     /// What is held.
     pub(super) residency: &'a Residency,
+    /// The cells that were asked for and are not built, first to last; `None` where nothing is built on demand.
+    pub(super) asked: Option<RefCell<Vec<CellId>>>,
 }
 
 impl Demand for Wants<'_> {
@@ -208,12 +239,11 @@ impl Demand for Wants<'_> {
         let here = self.opened.cell_of(eye);
         let at = Aabb::of([eye.eye.as_vec3()]);
         let outlines = self.opened.division.cells.outlines();
-        let mut near: Vec<(bool, f32, CellId)> = self
-            .opened
-            .built
-            .cells
-            .keys()
-            .map(|&id| (Some(id) != here, outlines[id.index()].region.distance(&at), id))
+        let known = |id: &CellId| self.asked.is_some() || self.opened.built.cells.contains_key(id);
+        let mut near: Vec<(bool, f32, CellId)> = (0..outlines.len() as u32)
+            .map(CellId)
+            .filter(known)
+            .map(|id| (Some(id) != here, outlines[id.index()].region.distance(&at), id))
             .filter(|(elsewhere, d, _)| !elsewhere || *d <= radius)
             .collect();
         near.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
@@ -221,7 +251,10 @@ impl Demand for Wants<'_> {
     }
 
     fn of(&self, cell: CellId, from: &Camera, out: &mut Vec<Candidate>) {
-        self.opened.with_view(cell, from, |far, view, _| far.wanted(view, out));
+        let built = self.opened.with_view(cell, from, |far, view| far.wanted(view, out));
+        if let (None, Some(asked)) = (built, &self.asked) {
+            asked.borrow_mut().push(cell);
+        }
     }
 
     fn resident(&self, block: Block) -> bool {

@@ -1,0 +1,80 @@
+//! Building while walking: the cells that a scheduler asks for, in its order, within a time budget a frame.
+//!
+//! The inside of the cell that the eye is in is made at once, since without it nothing tells near from far; far fields wait for
+//! their turn and are counted as missing until they are there. A cell that takes longer than the budget is paid for by later frames,
+//! so that the mean over a walk holds. What is built goes into the store: the next walk finds it.
+
+use std::time::Instant;
+
+use farfield_core::id::CellId;
+use farfield_core::{Camera, Fault};
+
+use super::opened::Opened;
+use crate::build::Site;
+use crate::results::Preprocess;
+
+/// See the module.
+pub struct OnDemand<'a> {
+    site: &'a Site<'a>,
+    ms_per_frame: f64,
+    /// What may be spent now, milliseconds; below zero, later frames pay.
+    account_ms: f64,
+}
+
+impl<'a> OnDemand<'a> {
+    /// Nothing spent.
+    pub fn new(site: &'a Site<'a>, ms_per_frame: f64) -> Self {
+        Self { site, ms_per_frame, account_ms: 0.0 }
+    }
+
+    /// Makes the inside of the cell that serves a camera.
+    ///
+    /// # Errors
+    /// What the partition gives.
+    pub(super) fn enter(&self, opened: &mut Opened<'_>, camera: &Camera) -> Result<(), Fault> {
+        let Some(id) = opened.division.cells.find(camera) else { return Ok(()) };
+        if opened.built.cells.contains_key(&id) {
+            return Ok(());
+        }
+        opened.add(id, self.site.inside_of(opened.pipeline, opened.division, id)?)
+    }
+
+    /// Builds the cell that serves a camera, whatever time it takes.
+    ///
+    /// # Errors
+    /// What building gives.
+    pub fn serve(mut self, opened: &mut Opened<'_>, camera: &Camera) -> Result<(), Fault> {
+        self.enter(opened, camera)?;
+        let cell: Vec<CellId> = opened.cell_of(camera).into_iter().collect();
+        self.build(opened, &cell)
+    }
+
+    /// Builds the cells that were `asked` for, first to last, as long as there is time.
+    ///
+    /// # Errors
+    /// What building gives.
+    pub(super) fn build(&mut self, opened: &mut Opened<'_>, asked: &[CellId]) -> Result<(), Fault> {
+        self.account_ms = (self.account_ms + self.ms_per_frame).min(self.ms_per_frame);
+        for &id in asked {
+            if self.account_ms <= 0.0 {
+                break;
+            }
+            let start = Instant::now();
+            let shared = opened.built.shared.as_ref().map(|s| (s.0, &s.1));
+            let (id, cell, needs, new) = self.site.cell(opened.pipeline, opened.division, id, shared)?;
+            let seconds = start.elapsed().as_secs_f64();
+            self.account_ms -= 1e3 * seconds;
+            opened.built.covers = needs.covers;
+            let bytes = cell.manifest.as_ref().map_or(0, |m| m.bytes() + m.index.len() as u64);
+            let Preprocess { seconds: spent, cells_built, bytes_stored, .. } = &mut opened.built.preprocess;
+            *bytes_stored += bytes;
+            if new {
+                *spent += seconds;
+                *cells_built += 1;
+            }
+            opened.note(&needs.left_out);
+            opened.add(id, cell)?;
+        }
+        Ok(())
+    }
+}
