@@ -62,7 +62,9 @@ fn found(folder: &tempfile::TempDir, scale: f64, offset: f64, on: BackendName) -
         let pooled = reference.iter().zip(&frames).map(|(r, f)| errors(r, f).luminance).reduce(|a, b| a.joined(b));
         Found {
             psnr_db: pooled.unwrap().psnr_db(),
-            stored: lab.with(i, |o| o.built.cells.values().flat_map(|c| &c.manifest).map(|m| m.triangles()).sum()).unwrap(),
+            stored: lab
+                .with(i, |o| o.built.cells.values().flat_map(|c| &c.manifest).map(|m| m.triangles()).sum())
+                .unwrap(),
             drawn: frames.iter().map(|f| f.near_triangles + f.far_triangles).sum(),
             cells: frames.iter().map(|f| f.cell).collect(),
             pictures: frames.into_iter().map(|f| f.rendered.picture).collect(),

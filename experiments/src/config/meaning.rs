@@ -53,7 +53,8 @@ fn scene(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes
     for (key, wanted) in [("path", "file"), ("models", "folder")] {
         if let Some(path) = scene.get(key).and_then(Value::as_str).map(str::to_owned) {
             let full = absolute(folder, &path);
-            let there = if wanted == "file" { Path::new(&full).is_file() } else { Path::new(&full).is_dir() };
+            // A path may be a folder too: of model files.
+            let there = Path::new(&full).is_dir() || (wanted == "file" && Path::new(&full).is_file());
             if !there {
                 mistakes.add(&at(root, "scene", key), format!("there is no {wanted} {full}"), "not there", None);
             }

@@ -34,7 +34,8 @@ pub enum Up {
 pub struct SceneSettings {
     /// A generated scene.
     pub source: Option<Generated>,
-    /// A model file (.obj, .ply, .gltf, .glb, .stl, each also as .gz), relative to the experiment file.
+    /// A model file (.obj, .ply, .gltf, .glb, .stl, each also as .gz) or a folder of them in one coordinate frame, relative to the
+    /// experiment file.
     pub path: Option<String>,
     /// Triangles of a generated scene, all objects together.
     #[schemars(range(min = 1))]

@@ -13,6 +13,7 @@
 
 mod bytes;
 mod error;
+mod folder;
 mod gltf;
 mod gltf_accessor;
 mod mtl;
@@ -90,7 +91,7 @@ pub struct Imported {
     pub counts: Counts,
 }
 
-/// Loads a file as a scene: meshes in the file's own space, placed by 64-bit transforms that include the options' axes and scale.
+/// Loads a file, or all model files of a folder, as a scene: meshes in the file's own space, placed by 64-bit transforms that include the options' axes and scale.
 ///
 /// # Errors
 /// [`LoadError`] with the file, the place in it and the cause.
@@ -216,9 +217,16 @@ fn root(path: &Path, options: &LoadOptions) -> Result<DAffine3, LoadError> {
 }
 
 fn read(path: &Path, options: &LoadOptions) -> Result<Checked, LoadError> {
+    if path.is_dir() { folder::read(path, options) } else { read_file(path, options) }
+}
+
+type Reader = fn(&Path, &[u8]) -> Result<part::Model, LoadError>;
+
+/// What reads a file, by its name.
+fn reader(path: &Path) -> Result<Reader, LoadError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     let stem = name.strip_suffix(".gz").unwrap_or(&name);
-    let reader = match stem.rsplit_once('.').map(|(_, e)| e) {
+    Ok(match stem.rsplit_once('.').map(|(_, e)| e) {
         Some("obj") => obj::read,
         Some("ply") => ply::read,
         Some("stl") => stl::read,
@@ -228,8 +236,11 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Checked, LoadError> {
             let place = other.map_or("a name without extension".to_owned(), |e| format!("format .{e}"));
             return Err(LoadError::unsupported(path, place, cause));
         }
-    };
-    let mut model = reader(path, &bytes::read(path)?)?;
+    })
+}
+
+fn read_file(path: &Path, options: &LoadOptions) -> Result<Checked, LoadError> {
+    let mut model = reader(path)?(path, &bytes::read(path)?)?;
     if let Some(two_sided) = options.two_sided {
         model.materials.iter_mut().for_each(|m| m.two_sided = two_sided);
     }

@@ -469,3 +469,29 @@ fn devices_are_not_read() {
     let warnings = load(&path, &LoadOptions::default()).unwrap().warnings;
     assert!(warnings.iter().any(|w| w.contains("/dev/zero")), "{warnings:?}");
 }
+
+#[test]
+fn a_folder_is_its_model_files_in_one_frame() {
+    let dir = tempfile::tempdir().unwrap();
+    let refused = load(dir.path(), &LoadOptions::default()).err().unwrap().to_string();
+    assert!(refused.contains("holds no model file"), "{refused}");
+    put(dir.path(), "b.obj", format!("mtllib b.mtl\n{OBJ}usemtl red\nf 1 2 3\n").as_bytes());
+    put(dir.path(), "b.mtl", b"newmtl red\nKd 1 0 0\n");
+    put(dir.path(), "a.obj", format!("{OBJ}f 1 2 3 4\n").as_bytes());
+    put(dir.path(), "notes.txt", b"no model");
+    let all = load(dir.path(), &LoadOptions::default()).unwrap();
+    assert_eq!((all.counts.meshes, all.counts.triangles), (2, 3));
+    let scene = all.builder.build().unwrap();
+    let colors: Vec<[f32; 4]> = scene
+        .chunks
+        .iter()
+        .enumerate()
+        .map(|(i, _)| scene.materials[scene.material_of(farfield_core::id::ChunkId(i as u32)).index()].base_color)
+        .collect();
+    assert_eq!(scene.triangles(), 3);
+    assert_eq!(colors[1], [1.0, 0.0, 0.0, 1.0], "b's material is its own: {colors:?}");
+    // One bad file refuses the folder, by its name.
+    put(dir.path(), "c.obj", b"v 0 0 0\nf 1 2 3\n");
+    let refused = load(dir.path(), &LoadOptions::default()).err().unwrap().to_string();
+    assert!(refused.contains("c.obj"), "{refused}");
+}
