@@ -10,9 +10,9 @@ use super::parts::{LONGEST, Part, Piece};
 use super::route::{Line, Vessel};
 
 /// Chances that a straight cell with a straight one before it holds a joint, a valve, a reducer.
-const JOINT: f64 = 0.16;
-const VALVE: f64 = 0.07;
-const REDUCER: f64 = 0.02;
+const JOINT: f64 = 0.22;
+const VALVE: f64 = 0.1;
+const REDUCER: f64 = 0.03;
 
 /// A part and its place.
 pub(super) type Placed = (Part, DAffine3);

@@ -206,7 +206,7 @@ impl Pipe {
     }
 
     fn bend(&self, out: &mut Solid) {
-        out.bend(self.sides, (2 * self.sides / 5).max(2), self.paint, 0.5, self.radius);
+        out.bend(self.sides, (self.sides / 3).max(2), self.paint, 0.5, self.radius);
         self.socket(out, frame(Vec3::X * -0.5, Vec3::NEG_X, Vec3::Y), self.radius);
         self.socket(out, frame(Vec3::Y * 0.5, Vec3::Y, Vec3::NEG_X), self.radius);
     }

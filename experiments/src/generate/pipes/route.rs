@@ -20,6 +20,8 @@ const SHORTEST: usize = 4;
 const RUN: std::ops::RangeInclusive<i32> = 2..=12;
 /// Share of the bundles that start upwards or downwards in a riser cell.
 const RISERS: f64 = 0.15;
+/// Share of the tries at branches; many fail.
+const BRANCHES: f64 = 0.4;
 /// Random cells that a start is chosen from.
 const STARTS: usize = 6;
 /// One vessel for so many cells.
@@ -120,7 +122,7 @@ pub(super) fn lines(lattice: &mut Lattice, vessels: &[Vessel], rng: &mut ChaCha8
             break;
         }
         let before = out.len();
-        if !out.is_empty() && rng.random_bool(0.3) {
+        if !out.is_empty() && rng.random_bool(BRANCHES) {
             branch(lattice, &mut out, rng);
         } else {
             bundle(lattice, &mut out, rng);
@@ -140,11 +142,13 @@ fn branch(lattice: &mut Lattice, lines: &mut Vec<Line>, rng: &mut ChaCha8Rng) {
     let parent = &lines[which];
     let i = rng.random_range(1..parent.cells.len() - 1);
     let (into, out) = parent.through(i);
-    let d = DIRECTIONS[rng.random_range(0..6)];
     let apart = |t: &(usize, IVec3)| t.0.abs_diff(i) > 1;
-    if into != out || d.dot(into) != 0 || lattice.gallery(parent.cells[i]) || !parent.tees.iter().all(apart) {
+    if into != out || lattice.gallery(parent.cells[i]) || !parent.tees.iter().all(apart) {
         return;
     }
+    let first = rng.random_range(0..6);
+    let across = (0..6).map(|k| DIRECTIONS[(first + k) % 6]).filter(|d| d.dot(into) == 0);
+    let Some(d) = across.max_by_key(|&d| room(lattice, parent.cells[i], d)) else { return };
     let system = parent.system;
     if let Some(cells) = lay(lattice, parent.cells[i] + d, d, None, rng) {
         lines[which].tees.push((i, d));
@@ -152,7 +156,12 @@ fn branch(lattice: &mut Lattice, lines: &mut Vec<Line>, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// One to five pipes side by side.
+/// How many cells, at most 12, are open from `c` in direction `d`.
+fn room(lattice: &Lattice, c: IVec3, d: IVec3) -> usize {
+    (1..=12).take_while(|&s| lattice.open(c + d * s, d)).count()
+}
+
+/// Some pipes side by side.
 fn bundle(lattice: &mut Lattice, lines: &mut Vec<Line>, rng: &mut ChaCha8Rng) {
     let mut draw = rng.random_range(0..SYSTEMS.iter().map(|s| s.share).sum());
     let passed = |s: &&System| {
