@@ -77,7 +77,9 @@ fn a_million_triangles_are_thousands_of_placed_parts_of_few_meshes() {
     assert_eq!(names.len(), scene.meshes.len());
     for part in ["tube 3", "bend", "joint", "valve", "tee", "end", "reducer"] {
         let kinds = names.iter().filter(|n| n.ends_with(part)).count();
-        assert!(kinds >= SYSTEMS.len(), "only {kinds} kinds of {part}");
+        // Reducers are rare: a system of few pipes may have none.
+        let least = if part == "reducer" { SYSTEMS.len() / 2 } else { SYSTEMS.len() };
+        assert!(kinds >= least, "only {kinds} kinds of {part}");
     }
 }
 
