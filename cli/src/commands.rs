@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use farfield_experiments::config::{self, Experiment};
+use farfield_experiments::config::{self, Experiment, Generated};
 use farfield_experiments::failure::Failure;
 use farfield_experiments::results::Summary;
 use farfield_experiments::run::{self, Options};
@@ -42,7 +42,7 @@ pub(crate) fn run(args: Args, cancel: &AtomicBool) -> Result<(), Failure> {
             render(&load(&input)?, &pipeline, frame, &out, &options(store))
         }
         Command::Compare { runs, out } => compare(&runs, &out),
-        Command::Scene { kind: _, triangles, seed, out } => generate(triangles, seed, &out),
+        Command::Scene { kind, triangles, seed, out } => generate(kind, triangles, seed, &out),
     }
 }
 
@@ -98,9 +98,13 @@ fn compare(runs: &[PathBuf], out: &Path) -> Result<(), Failure> {
     print(&format!("{table}\nreport: {}\n", out.display()))
 }
 
-fn generate(triangles: u64, seed: u64, out: &Path) -> Result<(), Failure> {
-    let park = scene::generate_park(triangles, seed)?;
-    let (written, statues) = (park.triangles(), park.placements.len());
-    scene::write_park(out, park)?;
-    print(&format!("{}: {written} triangles, {statues} statues\n", out.display()))
+fn generate(kind: Generated, triangles: Option<u64>, seed: u64, out: &Path) -> Result<(), Failure> {
+    let parts = scene::generate(kind, triangles, seed)?;
+    let (written, objects) = (parts.triangles(), parts.placements.len());
+    let what = match kind {
+        Generated::Park => "statues",
+        Generated::Pipes => "parts",
+    };
+    scene::write(out, kind, parts)?;
+    print(&format!("{}: {written} triangles, {objects} {what}\n", out.display()))
 }

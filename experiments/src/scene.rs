@@ -8,10 +8,10 @@ use farfield_core::mesh::TriangleMesh;
 use farfield_core::scene::{Light, LightKind, Material, Placement, Scene, SceneBuilder, Texture};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-use crate::config::{Experiment, LightSettings, SceneSettings, Up};
+use crate::config::{Experiment, Generated, LightSettings, SceneSettings, Up};
 use crate::export::{Export, ExportError, export};
 use crate::failure::Failure;
-use crate::generate::{self, PAPER_MODELS, ParkScene, ParkSettings, park, park_of};
+use crate::generate::{self, PAPER_MODELS, ParkScene, ParkSettings, PipesScene, PipesSettings, park, park_of, pipes};
 use crate::load::{self, LoadOptions};
 
 /// A loaded or generated scene.
@@ -54,17 +54,18 @@ fn file(s: &SceneSettings, path: &str) -> Result<Loaded, Failure> {
 }
 
 fn generated(s: &SceneSettings, to_world: DAffine3) -> Result<Loaded, Failure> {
-    let settings = ParkSettings { triangles: s.triangles, seed: s.seed };
     let refused = |e: &dyn ToString| Failure::input("the scene was not generated", e.to_string());
     let two_sided = s.two_sided.unwrap_or(false);
-    let (park, materials, textures, source) = match &s.models {
-        None => (park(&settings).map_err(|e| refused(&e))?, vec![statue(two_sided)], vec![], "park".to_owned()),
+    let kind = s.source.unwrap_or(Generated::Park);
+    let (parts, materials, textures, source) = match &s.models {
+        None => (generate(kind, s.triangles, s.seed)?, vec![painted(kind, two_sided)], vec![], kind.name().to_owned()),
         Some(folder) => {
+            let settings = ParkSettings { triangles: s.triangles.unwrap_or(kind.triangles()), seed: s.seed };
             let (park, materials, textures) = of_models(&settings, Path::new(folder), two_sided)?;
-            (park, materials, textures, format!("park of {folder}"))
+            (park.into(), materials, textures, format!("park of {folder}"))
         }
     };
-    let scene = placed(park, materials, textures, to_world).map_err(|e| refused(&e))?;
+    let scene = placed(parts, materials, textures, to_world).map_err(|e| refused(&e))?;
     Ok(Loaded { scene, source, warnings: vec![] })
 }
 
@@ -94,7 +95,7 @@ fn of_models(
 }
 
 fn placed(
-    park: ParkScene,
+    parts: Parts,
     materials: Vec<Material>,
     textures: Vec<Texture>,
     to_world: DAffine3,
@@ -102,45 +103,82 @@ fn placed(
     let mut builder = SceneBuilder::default();
     (builder.materials, builder.textures) = (materials, textures);
     let mut ids = vec![];
-    for (name, mesh) in park.meshes {
-        ids.push(builder.mesh(name, sectioned(mesh))?);
+    for (name, mesh) in parts.meshes {
+        ids.push(builder.mesh(&name, sectioned(mesh))?);
     }
-    for p in &park.placements {
-        builder.place(Placement { mesh: ids[p.kind as usize], transform: to_world * transform(p) });
+    for (mesh, transform) in parts.placements {
+        builder.place(Placement { mesh: ids[mesh], transform: to_world * transform });
     }
     builder.build()
 }
 
-/// A sculpted park to be written to a file.
-///
-/// # Errors
-/// [`Failure::Input`] where there is no such park.
-pub fn generate_park(triangles: u64, seed: u64) -> Result<ParkScene, Failure> {
-    park(&ParkSettings { triangles, seed }).map_err(|e| Failure::input("the scene was not generated", e))
+/// A generated scene as meshes and where they are placed.
+pub struct Parts {
+    /// Meshes with their names.
+    pub meshes: Vec<(String, TriangleMesh)>,
+    /// Which mesh, and from its space to the scene.
+    pub placements: Vec<(usize, DAffine3)>,
 }
 
-/// Writes a park: one node a statue.
+impl Parts {
+    /// Triangles of all placed meshes together.
+    pub fn triangles(&self) -> u64 {
+        self.placements.iter().map(|p| self.meshes[p.0].1.triangles() as u64).sum()
+    }
+}
+
+impl From<ParkScene> for Parts {
+    fn from(park: ParkScene) -> Self {
+        Self {
+            placements: park.placements.iter().map(|p| (p.kind as usize, transform(p))).collect(),
+            meshes: park.meshes.into_iter().map(|(n, m)| (n.to_owned(), m)).collect(),
+        }
+    }
+}
+
+impl From<PipesScene> for Parts {
+    fn from(pipes: PipesScene) -> Self {
+        Self { meshes: pipes.meshes, placements: pipes.placements }
+    }
+}
+
+/// A scene out of nothing but a seed; without `triangles` of the size that its kind has by default.
+///
+/// # Errors
+/// [`Failure::Input`] where there is no such scene.
+pub fn generate(kind: Generated, triangles: Option<u64>, seed: u64) -> Result<Parts, Failure> {
+    let triangles = triangles.unwrap_or(kind.triangles());
+    let made = match kind {
+        Generated::Park => park(&ParkSettings { triangles, seed }).map(Parts::from),
+        Generated::Pipes => pipes(&PipesSettings { triangles, seed }).map(Parts::from),
+    };
+    made.map_err(|e| Failure::input("the scene was not generated", e))
+}
+
+/// Writes a generated scene: one node a placed mesh.
 ///
 /// # Errors
 /// What writing gives; a wrong format is [`Failure::Input`].
-pub fn write_park(file: &Path, park: ParkScene) -> Result<(), Failure> {
-    let placements: Vec<(usize, DAffine3)> = park.placements.iter().map(|p| (p.kind as usize, transform(p))).collect();
-    let meshes: Vec<(String, TriangleMesh)> =
-        park.meshes.into_iter().map(|(n, m)| (n.to_owned(), sectioned(m))).collect();
-    let materials = [statue(false)];
-    let scene = Export { meshes: &meshes, placements: &placements, materials: &materials, textures: &[] };
+pub fn write(file: &Path, kind: Generated, parts: Parts) -> Result<(), Failure> {
+    let meshes: Vec<(String, TriangleMesh)> = parts.meshes.into_iter().map(|(n, m)| (n, sectioned(m))).collect();
+    let materials = [painted(kind, false)];
+    let scene = Export { meshes: &meshes, placements: &parts.placements, materials: &materials, textures: &[] };
     export(file, &scene).map_err(|e| match e {
         ExportError::Unsupported { .. } => Failure::input("the scene was not written", e),
         ExportError::Write { .. } => Failure::work("the scene was not written", e),
     })
 }
 
-/// Sculpted statues carry their colours in their vertices.
-fn statue(two_sided: bool) -> Material {
-    Material { name: "statue".into(), base_color: [1.0; 4], texture: None, two_sided }
+/// Generated meshes carry their colours in their vertices.
+fn painted(kind: Generated, two_sided: bool) -> Material {
+    let name = match kind {
+        Generated::Park => "statue",
+        Generated::Pipes => "paint",
+    };
+    Material { name: name.into(), base_color: [1.0; 4], texture: None, two_sided }
 }
 
-/// A sculpted mesh names no material: all of it is the first.
+/// A generated mesh names no material: all of it is the first.
 fn sectioned(mut mesh: TriangleMesh) -> TriangleMesh {
     if mesh.sections.is_empty() {
         mesh.sections = vec![(0..mesh.indices.len() as u32, MaterialId(0))];

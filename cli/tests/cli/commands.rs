@@ -168,6 +168,16 @@ fn a_generated_scene_can_be_loaded_again() {
     assert!((triangles / 100_000.0 - 1.0).abs() < 0.01, "{triangles}");
     assert_eq!(f.fails(&["scene", "park", "--triangles", "5", "--out", "x.glb"]).0, 2);
     assert_eq!(f.fails(&["scene", "park", "--triangles", "100000", "--out", "x.txt"]).0, 2);
+
+    let said = f.ok(&["scene", "pipes", "--triangles", "20000", "--seed", "2", "--out", "pipes.glb"]);
+    assert!(said.contains("parts"), "{said}");
+    let plan =
+        f.ok(&["plan", "experiment.toml", "--json", "--set", "scene.path=pipes.glb", "--set", "view.path=still"]);
+    let plan: serde_json::Value = serde_json::from_str(&plan).unwrap();
+    let triangles = plan["scene_triangles"].as_f64().unwrap();
+    assert!((triangles / 20_000.0 - 1.0).abs() < 0.02, "{triangles}");
+    assert_eq!(f.fails(&["scene", "pipes", "--triangles", "9999", "--out", "x.glb"]).0, 2);
+    assert_eq!(f.fails(&["scene", "castle", "--out", "x.glb"]).0, 2);
 }
 
 #[test]
@@ -188,5 +198,25 @@ fn the_example_park_runs() {
     small.iter().for_each(|s| args.extend(["--set", s]));
     let said = f.ok(&args);
     assert!(said.contains("hybrid edge_px=4.5"), "{said}");
+    assert!(f.path("out/report.html").is_file());
+}
+
+#[test]
+fn the_example_pipes_run() {
+    let f = Folder::new();
+    let pipes = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/pipes.toml");
+    let small = [
+        "all geometry.backend=cpu",
+        "frustum culled.backend=cpu",
+        "scene.triangles=50000",
+        "view.resolution=64",
+        "view.frames=3",
+        "measure.every=1",
+        "measure.audit_views=4",
+    ];
+    let mut args = vec!["run", pipes, "--out", "out"];
+    small.iter().for_each(|s| args.extend(["--set", s]));
+    let said = f.ok(&args);
+    assert!(said.contains("frustum culled"), "{said}");
     assert!(f.path("out/report.html").is_file());
 }

@@ -7,7 +7,12 @@ use serde_json::{Map, Value};
 
 use super::mistakes::Collector;
 use super::node::{At, Node};
+use super::settings::Generated;
+use crate::generate::gallery_height;
 use crate::path::PATHS;
+
+/// How a scene is named.
+pub(super) const SCENE_HELP: &str = "source = \"park\" or \"pipes\" generates a scene, path = \"model.glb\" loads one";
 
 /// Checks, and makes paths absolute and the reference explicit.
 pub(super) fn check(
@@ -39,7 +44,7 @@ fn scene(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes
         return;
     }
     let Some(scene) = resolved["scene"].as_object_mut() else { return };
-    let help = Some("source = \"park\" generates a scene, path = \"model.glb\" loads one".to_owned());
+    let help = Some(SCENE_HELP.to_owned());
     match (scene.contains_key("source"), scene.contains_key("path")) {
         (true, true) => {
             mistakes.add(&at(root, "scene", "path"), "[scene] has both `source` and `path`", "one of the two", help)
@@ -49,6 +54,13 @@ fn scene(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes
             mistakes.add(&at(root, "scene", ""), "[scene] needs `source` or `path`", "neither is here", help);
         }
         _ => {}
+    }
+    if let Some(kind) = generated(scene) {
+        scene.entry("triangles").or_insert(kind.triangles().into());
+        if kind != Generated::Park && scene.contains_key("models") {
+            let message = format!("`models` makes a park; {} are not made of them", kind.name());
+            mistakes.add(&at(root, "scene", "models"), message, "not here", None);
+        }
     }
     for (key, wanted) in [("path", "file"), ("models", "folder")] {
         if let Some(path) = scene.get(key).and_then(Value::as_str).map(str::to_owned) {
@@ -63,8 +75,22 @@ fn scene(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes
     }
 }
 
+/// What generates the scene, where one is named that there is.
+fn generated(scene: &Map<String, Value>) -> Option<Generated> {
+    let name = scene.get("source").and_then(Value::as_str)?;
+    Generated::ALL.into_iter().find(|g| g.name() == name)
+}
+
 fn view(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes: &mut Collector<'_>) {
+    // The one height at which there is always a way through pipes depends on their total.
+    let gallery = resolved["scene"].as_object().filter(|s| generated(s) == Some(Generated::Pipes)).and_then(|s| {
+        let scale = s.get("scale").and_then(Value::as_f64)?;
+        Some(scale * gallery_height(s.get("triangles").and_then(Value::as_u64)?))
+    });
     let Some(view) = resolved["view"].as_object_mut() else { return };
+    if let Some(height) = gallery {
+        view.entry("eye_height").or_insert(serde_json::json!([height, height]));
+    }
     let numbers = |v: &Map<String, Value>, key: &str| -> Vec<f64> {
         v.get(key).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_f64).collect()
     };

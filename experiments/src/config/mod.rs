@@ -84,7 +84,7 @@ pub fn parse(
     }
     let start = At::default();
     if root.get("scene").is_none() {
-        let help = "[scene] takes source = \"park\" or path = \"model.glb\"".to_owned();
+        let help = format!("in [scene], {}", meaning::SCENE_HELP);
         walk.mistakes.add(&start, "the experiment needs a table `scene`", "no [scene] in this file", Some(help));
     }
     for name in ["scene", "view", "light", "reference", "budget", "measure", "build"] {

@@ -145,3 +145,20 @@ fn an_empty_file_says_what_is_missing() {
     let all = told("", &[]).join("\n");
     assert!(all.contains("needs a table `scene`") && all.contains("at least one [[pipeline]]"), "{all}");
 }
+
+#[test]
+fn pipes_bring_their_own_size_and_eye_height() {
+    let text = GOOD.replace("source = \"park\"\ntriangles = 200_000", "source = \"pipes\"");
+    let e = read(&text, &[]).unwrap();
+    assert_eq!(e.resolved["scene"]["triangles"], serde_json::json!(1_000_000));
+    let half = crate::generate::gallery_height(1_000_000);
+    assert_eq!(e.view.eye_height, Some([half as f32; 2]));
+    let scaled = read(&text, &["scene.scale=2"]).unwrap();
+    assert_eq!(scaled.view.eye_height, Some([2.0 * half as f32; 2]));
+    let own = read(&text, &["view.eye_height=3"]).unwrap();
+    assert_eq!(own.view.eye_height, Some([3.0; 2]));
+    let park = read(&GOOD.replace("triangles = 200_000", ""), &[]).unwrap();
+    assert_eq!((park.scene.triangles, park.view.eye_height), (Some(2_017_700), None));
+    let all = told(&text.replace("\"pipes\"", "\"pipes\"\nmodels = \"/\""), &[]);
+    assert_eq!(all, ["park.toml:4:10: `models` makes a park; pipes are not made of them"]);
+}

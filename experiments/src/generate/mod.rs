@@ -2,8 +2,8 @@
 //!
 //! [`park`] is a statuary park after the one that system T was measured on: eight kinds of procedurally sculpted statues with
 //! that scene's triangle counts, sizes, numbers and area, at any total from 100,000 to 64 million triangles; or the same
-//! park from mesh files, fitted to the same boxes ([`fit`]). Everything here is a pure function of its settings: the same
-//! settings give the same bytes, whatever the number of threads.
+//! park from mesh files, fitted to the same boxes ([`fit`]). [`pipes`] is a box full of pipework, from 10,000 to 16 million.
+//! Everything here is a pure function of its settings: the same settings give the same bytes, whatever the number of threads.
 
 mod creatures;
 mod figures;
@@ -12,6 +12,7 @@ mod kind;
 mod march;
 mod noise;
 pub mod park;
+pub mod pipes;
 mod quadrupeds;
 mod remesh;
 mod sculpt;
@@ -24,14 +25,17 @@ mod tests;
 pub use fit::{Up, fit_to_box};
 pub use kind::{Kind, PAPER_MODELS, PaperModel};
 pub use park::{Layout, PARK_2M, PARK_4M, PARK_8M, ParkScene, ParkSettings, Placement, layout, park, park_of};
+pub use pipes::{LEAST_PIPES, MOST_PIPES, PIPES_1M, PipesScene, PipesSettings, gallery_height, pipes};
 pub use sculpt::{LEAST_TRIANGLES, MOST_TRIANGLES, sculpt};
 
 /// Why a scene could not be generated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GenerateError {
-    /// A park's total is out of range.
-    #[error("a park of {asked} triangles: the total must be between {least} and {most}")]
+    /// A scene's total is out of range.
+    #[error("{what} of {asked} triangles: the total must be between {least} and {most}")]
     Total {
+        /// What scene.
+        what: &'static str,
         /// What was asked for.
         asked: u64,
         /// Least total.

@@ -151,7 +151,7 @@ pub fn park_of(
 pub fn layout(settings: &ParkSettings) -> Result<Layout, GenerateError> {
     let asked = settings.triangles;
     if !(LEAST_TOTAL..=MOST_TOTAL).contains(&asked) {
-        return Err(GenerateError::Total { asked, least: LEAST_TOTAL, most: MOST_TOTAL });
+        return Err(GenerateError::Total { what: "a park", asked, least: LEAST_TOTAL, most: MOST_TOTAL });
     }
     let (kinds, factor) = choose(asked);
     let mesh_triangles = Kind::ALL.map(|kind| {
