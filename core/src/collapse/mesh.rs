@@ -4,25 +4,27 @@
 //! writes the survivor's merged run at the list's end, and the list is squeezed when it has doubled. Runs stay contiguous, so
 //! walking a one-ring is a linear read; a squeeze is paid for by the appends since the last one.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use super::Collapsed;
+use super::rings::Rings;
 use crate::Fault;
 
 /// Marks a dead triangle's first corner.
-const DEAD: u32 = u32::MAX;
+pub(super) const DEAD: u32 = u32::MAX;
 
 const LOCKED: u8 = 1;
 /// One of its edges has other than two triangles.
-const BORDER: u8 = 2;
+pub(super) const BORDER: u8 = 2;
 /// One of its edges has not as many triangles running forwards as backwards.
-const ODD: u8 = 4;
+pub(super) const ODD: u8 = 4;
 
 /// What is known of a vertex: one fetch from memory.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
 struct Vertex {
-    position: Vec3,
+    /// And 0: four such rows become lanes without a copy.
+    position: Vec4,
     /// Its run in the list of triangles.
     start: u32,
     len: u32,
@@ -61,78 +63,43 @@ impl LiveMesh {
         if indices.len() / 3 > 1 << 29 || n >= DEAD as usize {
             return bad(format!("{} triangles and {n} vertices are too many", indices.len() / 3));
         }
-        if let Some(i) = indices.iter().position(|&i| i as usize >= n) {
+        // The highest first: unlike a search it is vectors' work.
+        if indices.iter().copied().max().is_some_and(|most| most as usize >= n) {
+            let i = indices.iter().position(|&i| i as usize >= n).unwrap_or_default();
             return bad(format!("triangle {} names vertex {} of {n}", i / 3, indices[i]));
         }
         if !locked.is_empty() && locked.len() != n {
             return bad(format!("{} lock flags for {n} vertices", locked.len()));
         }
-        let proper = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
-        let triangles: Vec<[u32; 3]> = indices
-            .chunks_exact(3)
-            .map(|t| [t[0], t[1], t[2]])
-            .map(|t| if proper(&t) { t } else { [DEAD; 3] })
-            .collect();
+        let mut triangles = indices.as_chunks::<3>().0.to_vec();
+        for t in &mut triangles {
+            if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
+                *t = [DEAD; 3];
+            }
+        }
+        let rings = Rings::new(n, &triangles);
+        let flags = rings.borders();
         let vertex = |(i, &position): (usize, &Vec3)| {
-            let flags = if locked.get(i) == Some(&true) { LOCKED } else { 0 };
-            Vertex { position, start: 0, len: 0, remap: i as u32, flags }
+            let (start, end) = rings.range(i);
+            let locked = if locked.get(i) == Some(&true) { LOCKED } else { 0 };
+            Vertex {
+                position: position.extend(0.0),
+                start: start as u32,
+                len: (end - start) as u32,
+                remap: i as u32,
+                flags: flags[i] | locked,
+            }
         };
-        let mut mesh = Self {
-            vertices: positions.iter().enumerate().map(vertex).collect(),
+        let vertices = positions.iter().enumerate().map(vertex).collect();
+        let lists = rings.triangles;
+        Ok(Self {
+            vertices,
             triangles,
-            lists: Vec::with_capacity(indices.len() * 2),
-            squeeze_at: 0,
-            live: 0,
+            live: lists.len() / 3,
+            squeeze_at: (2 * lists.len()).max(1024),
+            lists,
             unit: unit(positions),
-        };
-        mesh.list_triangles();
-        mesh.find_borders();
-        Ok(mesh)
-    }
-
-    /// Fills the vertices' runs and `lists`: counting sort of corners by vertex.
-    fn list_triangles(&mut self) {
-        let living = || self.triangles.iter().enumerate().filter(|(_, t)| t[0] != DEAD);
-        for (_, t) in living() {
-            t.iter().for_each(|&v| self.vertices[v as usize].len += 1);
-        }
-        let mut end = 0;
-        for v in &mut self.vertices {
-            (v.start, end) = (end, end + v.len);
-            v.len = 0;
-        }
-        self.lists.resize(end as usize, 0);
-        for (i, t) in living() {
-            for &v in t {
-                let v = &mut self.vertices[v as usize];
-                self.lists[(v.start + v.len) as usize] = i as u32;
-                v.len += 1;
-            }
-        }
-        self.live = end as usize / 3;
-        self.squeeze_at = (2 * self.lists.len()).max(1024);
-    }
-
-    fn find_borders(&mut self) {
-        // Triangles that run from the vertex at hand to this one, and back.
-        let mut count = vec![[0u32; 2]; self.vertices.len()];
-        for v in 0..self.vertices.len() as u32 {
-            for &t in self.triangles_of(v) {
-                let [next, last] = others(self.corners(t), v);
-                count[next as usize][0] += 1;
-                count[last as usize][1] += 1;
-            }
-            let mut flags = 0;
-            for &t in self.triangles_of(v) {
-                for x in others(self.corners(t), v) {
-                    // Emptied at the first look; later ones see a balanced pair.
-                    let [forth, back] = std::mem::take(&mut count[x as usize]);
-                    flags |=
-                        if forth != back { ODD } else { 0 } | if matches!(forth + back, 0 | 2) { 0 } else { BORDER };
-                }
-            }
-            self.vertices[v as usize].flags |= flags;
-        }
+        })
     }
 
     /// Number of vertices, dead and isolated ones included.
@@ -144,6 +111,12 @@ impl LiveMesh {
     /// Where a vertex is.
     #[inline]
     pub fn position(&self, vertex: u32) -> Vec3 {
+        self.vertices[vertex as usize].position.truncate()
+    }
+
+    /// Where a vertex is, and 0.
+    #[inline]
+    pub(super) fn row(&self, vertex: u32) -> Vec4 {
         self.vertices[vertex as usize].position
     }
 
@@ -244,7 +217,7 @@ impl LiveMesh {
         let flags = dying.flags;
         let stays = &mut self.vertices[onto as usize];
         (stays.start, stays.len) = (start as u32, (self.lists.len() - start) as u32);
-        stays.position = at;
+        stays.position = at.extend(0.0);
         stays.flags |= flags & (BORDER | ODD);
     }
 
@@ -287,7 +260,7 @@ impl LiveMesh {
             out.indices.extend_from_slice(t);
             out.triangles.push(i as u32);
         }
-        out.positions = self.vertices.iter().map(|v| v.position).collect();
+        out.positions = self.vertices.iter().map(|v| v.position.truncate()).collect();
         out.remap = remap;
         out
     }

@@ -45,9 +45,12 @@ mod batched;
 mod exact;
 mod lanes;
 mod mesh;
+mod prices;
 mod quadric;
 mod queue;
+mod rings;
 mod rules;
+mod spots;
 
 use glam::Vec3;
 
