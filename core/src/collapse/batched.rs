@@ -146,7 +146,13 @@ impl Edges {
     fn price<C: Cost + ?Sized>(&mut self, mesh: &LiveMesh, cost: &mut C, max_cost: f32) {
         self.ends.clear();
         self.prices.clear();
-        self.living.retain(|&t| mesh.is_alive(t));
+        let mut alive = 0;
+        for i in 0..self.living.len() {
+            let t = self.living[i];
+            self.living[alive] = t;
+            alive += mesh.is_alive(t) as usize;
+        }
+        self.living.truncate(alive);
         let mut filled = 0;
         for i in 0..self.living.len() {
             // A balanced edge runs up its ids in one of its triangles. No branch: it would be mispredicted every other time.
