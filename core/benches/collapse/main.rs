@@ -20,8 +20,8 @@ use glam::Vec3;
 use meshes::Mesh;
 use meshopt::{SimplifyOptions, VertexDataAdapter};
 
-/// Triangles kept, as shares of the input's.
-const SHARES: [f64; 6] = [0.5, 0.25, 0.1, 0.05, 0.02, 0.01];
+/// Triangles kept, as shares of the input's. The last one is there for the curves of the better methods to reach meshopt's last but one.
+const SHARES: [f64; 7] = [0.5, 0.25, 0.1, 0.05, 0.02, 0.01, 0.005];
 const SAMPLES: usize = 50_000;
 const RUNS: usize = 9;
 

@@ -5,9 +5,9 @@
 //! neighbours' too). An edge that the rules refuse is held and comes back when a triangle at one of its ends has changed.
 //!
 //! What limits it: memory latency. A collapse touches some 12 triangles, 14 vertices and 20 edges that lie where they lay in the
-//! input; in the heap, a price that falls below the current limit moves through about log4 of its length.
+//! input. Loops over rings have no branches that depend on data, beside their ends: those cost as much as memory does.
 
-use super::mesh::{LiveMesh, corner};
+use super::mesh::{LiveMesh, corner, has};
 use super::prices::Bits;
 use super::queue::Queue;
 use super::rules::Rules;
@@ -132,6 +132,8 @@ impl<'a, C: Cost + ?Sized> Exact<'a, C> {
         queue.remove(edge);
         spots.clear();
         apexes.clear();
+        apexes.resize(mesh.triangles_of(onto).len() + 1, 0);
+        let mut filled = 0;
         // Balanced edges are met once or more often each way: one way will do.
         let ways = 1 + mesh.is_odd(onto) as usize;
         for &t in mesh.triangles_of(onto) {
@@ -140,15 +142,13 @@ impl<'a, C: Cost + ?Sized> Exact<'a, C> {
                 spots.insert(*x, edges_of[t as usize][*k]);
             }
             let [x, y] = around.map(|s| s.1);
-            if x == from || y == from {
-                apexes.push(x ^ y ^ from);
-            }
+            apexes[filled] = x ^ y ^ from;
+            filled += ((x == from) | (y == from)) as usize;
         }
+        apexes.truncate(filled);
         for &t in mesh.triangles_of(from) {
             for (k, x) in spokes(mesh.corners(t), from) {
-                if x == onto {
-                    continue;
-                }
+                // `onto` itself is not on its ring.
                 let e = &mut edges_of[t as usize][k];
                 if let Some(kept) = spots.get(x)
                     && kept != *e
@@ -166,7 +166,7 @@ impl<'a, C: Cost + ?Sized> Exact<'a, C> {
         }
         for &w in apexes.iter() {
             let keeps = |v, partner| {
-                mesh.triangles_of(v).iter().map(|&t| mesh.corners(t)).any(|c| c.contains(&w) && !c.contains(&partner))
+                mesh.triangles_of(v).iter().map(|&t| mesh.corners(t)).any(|c| has(c, w) && !has(c, partner))
             };
             if !keeps(onto, from) && !keeps(from, onto) {
                 if let Some(e) = spots.get(w) {
@@ -234,7 +234,7 @@ impl Prices {
 /// The end of an edge beside `v`.
 #[inline]
 fn other(ends: [u32; 2], v: u32) -> u32 {
-    if ends[0] == v { ends[1] } else { ends[0] }
+    ends[0] ^ ends[1] ^ v
 }
 
 /// The two edges of a triangle at its corner `v`, each with its other end.

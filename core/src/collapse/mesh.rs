@@ -203,17 +203,25 @@ impl LiveMesh {
         let mut filled = 0;
         for &t in &old[stays] {
             new[filled] = t;
-            filled += !self.triangles[t as usize].contains(&from) as usize;
+            filled += !has(self.triangles[t as usize], from) as usize;
         }
         self.dying.clear();
         for &t in &old[comes] {
             let corners = &mut self.triangles[t as usize];
-            let dies = corners.contains(&onto);
+            let dies = has(*corners, onto);
             if dies {
                 let third = corners[0] ^ corners[1] ^ corners[2] ^ from ^ onto;
                 self.dying.push([t, third]);
             }
-            *corners = corners.map(|x| if dies { DEAD } else if x == from { onto } else { x });
+            *corners = corners.map(|x| {
+                if dies {
+                    DEAD
+                } else if x == from {
+                    onto
+                } else {
+                    x
+                }
+            });
             new[filled] = t;
             filled += !dies as usize;
         }
@@ -235,10 +243,12 @@ impl LiveMesh {
     fn unlist(&mut self, vertex: u32, triangle: u32) {
         let Vertex { start, len, .. } = &mut self.vertices[vertex as usize];
         let run = &mut self.lists[*start as usize..(*start + *len) as usize];
-        if let Some(i) = run.iter().position(|&t| t == triangle) {
-            run.copy_within(i + 1.., i);
-            *len -= 1;
+        let mut kept = 0;
+        for i in 0..run.len() {
+            run[kept] = run[i];
+            kept += (run[i] != triangle) as usize;
         }
+        *len = kept as u32;
     }
 
     fn squeeze(&mut self) {
@@ -282,6 +292,12 @@ impl LiveMesh {
 pub(super) fn corner(t: [u32; 3], v: u32) -> [usize; 3] {
     const TURNS: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
     TURNS[((t[1] == v) as usize) | (((t[2] == v) as usize) << 1)]
+}
+
+/// Whether `v` is a corner. No branch.
+#[inline]
+pub(super) fn has(t: [u32; 3], v: u32) -> bool {
+    (t[0] == v) | (t[1] == v) | (t[2] == v)
 }
 
 /// The two vertices of a triangle beside `v`, in the triangle's order beginning after `v`.

@@ -151,3 +151,29 @@ impl Bits {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_of_all_or_what_the_wanted_one_allows_comes_cheapest_first() {
+        let check = |prices: &[f32], wanted, share, want: &[u32]| {
+            let mut all = Prices::default();
+            // Twice: what is left of a pass must not show in the next.
+            for _ in 0..2 {
+                all.clear();
+                prices.iter().for_each(|&p| all.push(p));
+                assert_eq!(all.cheapest(wanted, share), want);
+            }
+        };
+        check(&[], 5, 0.3, &[]);
+        check(&[3.0, -1.0, f32::MAX, 0.0, -2.0, -0.0, 1e-30], 0, 1.0, &[4, 1, 3, 5, 6, 0, 2]);
+        // The wanted one is the third, 3.0: half as much more is the limit.
+        check(&[1.0, 9.0, 2.0, 4.4, 3.0, 4.6], 2, 0.3, &[0, 2, 4, 3]);
+        // More wanted than there are: only the share is a limit, and 64 are always looked at.
+        let falling: Vec<f32> = (0..1000).map(|i| (1000 - i) as f32).collect();
+        check(&falling, 5000, 0.3, &(700..1000).rev().collect::<Vec<u32>>());
+        check(&falling, 5000, 0.01, &(936..1000).rev().collect::<Vec<u32>>());
+    }
+}

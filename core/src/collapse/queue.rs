@@ -157,13 +157,96 @@ impl Queue {
         };
         let bucket = histogram.iter().position(reaches).unwrap_or_default() as u32;
         self.limit = price(bucket << SHIFT | ((1 << SHIFT) - 1));
-        self.run.reserve(below);
+        // One more, so that there is always a place to write to.
+        let mut taken = vec![0; below + 1];
+        let mut filled = 0;
         for (e, id) in self.edges.iter_mut().zip(0..) {
-            if e.state == State::Waiting && e.cost <= self.limit {
-                e.state = State::Ready;
-                self.run.push(entry(e, id));
-            }
+            // No branch: it would be mispredicted at every other edge.
+            let take = (e.state == State::Waiting) & (e.cost <= self.limit);
+            taken[filled] = id;
+            filled += take as usize;
+            e.state = if take { State::Ready } else { e.state };
         }
+        self.run.extend(taken[..filled].iter().map(|&id| entry(&self.edges[id as usize], id)));
         self.run.sort_unstable();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    /// What is queued, in order: cost as its key, ends, edge.
+    type Model = BTreeMap<(u32, [u32; 2]), u32>;
+
+    #[test]
+    fn edges_come_out_as_from_one_sorted_map_whatever_happens_between() {
+        for seed in 0..4 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut queue = Queue::new(0.9);
+            let mut model = Model::new();
+            let mut costs = Vec::new();
+            // Few distinct costs in odd runs: ties are common. More edges than become ready at once.
+            let any = |rng: &mut ChaCha8Rng| match rng.random_range(0..20) {
+                0 => f32::NAN,
+                1 => f32::INFINITY,
+                2 => -0.0,
+                _ if seed % 2 == 0 => rng.random_range(-1.0..1.0),
+                _ => rng.random_range(-10..10) as f32 / 10.0,
+            };
+            let allowed = |c: f32| c <= 0.9;
+            for e in 0..20_000 {
+                let ends = [e / 2, e + 1];
+                queue.add(ends);
+                let cost = any(&mut rng);
+                queue.set(e, ends, cost);
+                costs.push(cost);
+                if allowed(cost) {
+                    model.insert((key(cost), ends), e);
+                }
+            }
+            let mut held = Vec::new();
+            while let Some((edge, cost)) = queue.pop() {
+                let (&(want, ends), &e) = model.first_key_value().unwrap();
+                assert_eq!((edge, key(cost), queue.ends(edge)), (e, want, ends), "seed {seed}");
+                model.pop_first();
+                if rng.random_bool(0.2) {
+                    queue.hold(edge);
+                    held.push(edge);
+                }
+                for _ in 0..3 {
+                    let e = rng.random_range(0..20_000);
+                    let (ends, old) = (queue.ends(e), costs[e as usize]);
+                    let was_in = model.get(&(key(old), ends)) == Some(&e);
+                    // Edges that are out stay so, or this would never end.
+                    if !was_in {
+                        continue;
+                    }
+                    model.remove(&(key(old), ends));
+                    if rng.random_bool(0.3) {
+                        queue.remove(e);
+                        continue;
+                    }
+                    let (ends, cost) = ([rng.random_range(0..9) + 100_000 + 10 * e, u32::MAX], any(&mut rng));
+                    queue.set(e, ends, cost);
+                    costs[e as usize] = cost;
+                    if allowed(cost) {
+                        model.insert((key(cost), ends), e);
+                    }
+                }
+                if rng.random_bool(0.05)
+                    && let Some(e) = held.pop()
+                {
+                    queue.release(e);
+                    model.insert((key(costs[e as usize]), queue.ends(e)), e);
+                }
+            }
+            assert!(model.is_empty(), "seed {seed}");
+        }
     }
 }

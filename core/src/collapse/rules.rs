@@ -107,7 +107,7 @@ fn folds(mesh: &LiveMesh, moving: u32, partner: u32, at: Vec3, min_cos: f32) -> 
         let [x, y] = others(mesh.corners(t), moving);
         // No branch: it would be mispredicted at every other collapse.
         four[filled] = [x, y];
-        filled += (x != partner && y != partner) as usize;
+        filled += ((x != partner) & (y != partner)) as usize;
         if filled == 4 {
             if fold.any(mesh, &four) {
                 return true;
