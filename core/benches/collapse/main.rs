@@ -1,12 +1,12 @@
 //! Edge collapse beside `meshopt::simplify`: time against measured surface distance, one thread, one run.
 //!
 //! `FARFIELD_MODELS=../models cargo bench -p farfield-core --bench collapse [-- name]` prints one table. Times are the least of nine
-//! runs, in which the methods take turns, and include everything from positions and indices to the new indices (meshopt's: its search for equal positions
-//! too, which farfield's importers have done before). On Linux they are the thread's processor time, so that a busy machine disturbs
-//! them less. meshopt knows no link condition, so it is off here; everything else is as by default. Distances are over 100,000
-//! points, half of them on either surface, relative to the diagonal of the mesh's box. `speed` is meshopt's time divided by the
-//! method's at equal root mean square distance: the method's time is interpolated along its own curve (log-log) at
-//! meshopt's distance; `-` where the curve does not reach that.
+//! runs, in which the methods take turns, and include everything from positions and indices to the new indices (meshopt's: its
+//! search for equal positions too, which farfield's importers have done before). On Linux they are the thread's processor
+//! time, so that a busy machine disturbs them less; it still shares its caches. meshopt knows no link condition, so it is off
+//! here; everything else is as by default. Distances are over 100,000 points, half of them on either surface, relative to the
+//! diagonal of the mesh's box. `speed` is meshopt's time divided by the method's at equal root mean square distance: the
+//! method's time is interpolated along its own curve (log-log) at meshopt's distance; `-` where the curve does not reach that.
 
 mod distance;
 mod meshes;
