@@ -382,6 +382,33 @@ fn quadrics_are_the_mean_squares_over_all_planes_gathered() {
 }
 
 #[test]
+fn hubs_collapse_as_the_brute_force_greedy_does() {
+    // Two hubs over a ring: each has more neighbours than a small table of a ring holds.
+    for seed in 0..8 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let n = 40;
+        let mut mesh = Mesh::default();
+        mesh.0.extend([vec3(-50.0, -50.0, -50.0), vec3(50.0, 50.0, 50.0), vec3(0.0, 0.0, 1.0), vec3(0.0, 0.0, -1.0)]);
+        for i in 0..n {
+            let turn = i as f32 / n as f32 * std::f32::consts::TAU;
+            mesh.0.push(3.0 * vec3(turn.cos(), turn.sin(), 0.0) + 0.1 * noise(&mut rng));
+            let (a, b) = (4 + i, 4 + (i + 1) % n);
+            mesh.1.extend([2, a, b]);
+            // Every other sheet has a hole below.
+            if i > 0 || seed % 2 == 0 {
+                mesh.1.extend([3, b, a]);
+            }
+        }
+        let settings = Settings { max_turn_rad: 4.0, link_condition: seed % 4 < 2, ..Settings::default() };
+        let mut cost = Weighted::new(mesh.0.len(), seed >= 4, &mut rng);
+        let want = reference(&mesh.0, &mesh.1, &[], &mut cost.clone(), &settings);
+        let got = collapse(LiveMesh::new(&mesh.0, &mesh.1, &[]).unwrap(), &mut cost, &settings);
+        check_sound(&mesh, &[], &got);
+        assert_eq!(got, want, "seed {seed}");
+    }
+}
+
+#[test]
 fn bad_input_is_refused_with_its_place() {
     let check = |indices: &[u32], locked: &[bool], says: &str| {
         let error = LiveMesh::new(&[Vec3::ZERO; 3], indices, locked).unwrap_err().to_string();

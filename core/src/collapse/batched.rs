@@ -2,34 +2,31 @@
 //!
 //! A pass prices every edge once and sorts the cheaper ones. Cheapest first, it chooses edges whose price no chosen one changes, up
 //! to a limit a little above the price of the edge that would be the last one if all could be had, so that dear edges are not
-//! taken while cheaper ones wait. Then it collapses the chosen in the order of their vertex ids, which is the order of
+//! taken while cheaper ones wait. Then it collapses the chosen in the order of their triangles, which is the order of
 //! memory. The idea of passes with an error limit is meshoptimizer's (Kapoulkine, simplifier.cpp); choosing first and
 //! collapsing in memory's order is not.
 //!
-//! A refused edge keeps its vertices from others for the pass. When that starves a pass, the next one tries one edge after
-//! the other, cheapest first, and looks at all of them.
+//! A refused edge keeps its vertices from others for the pass. Where that starves a pass, the next one tries one edge after
+//! the other, cheapest first, and looks at all of them, but takes few: on coarse meshes this is where quality is kept. The
+//! last few edges that are wanted are taken in the same way, among the cheap ones.
 //!
 //! What limits it: about 3 prices an edge of the input for a reduction to a tenth, then the collapses themselves.
 
-use super::mesh::{LiveMesh, Marks, others};
+use super::mesh::{LiveMesh, others};
+use super::prices::{Bits, Prices};
 use super::rules::Rules;
 use super::{BLOCK, Candidate, Collapsed, Cost, Reach, Settings, resolve};
 
 /// The share of its edges that a pass looks at.
 const SHARE: f32 = 0.3;
-/// A pass ends at this multiple of the price of its last wanted edge.
-const SLACK: f32 = 1.5;
+/// Of so many edges a pass takes one at once, without choosing first: prices that fall while it lasts must not wait for long.
+const FEW: usize = 32;
 
 pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Settings) -> Collapsed {
-    let mut touched = Marks::new(mesh.vertices());
-    let mut edges = Edges {
-        living: (0..mesh.all_triangles() as u32).collect(),
-        odd: (0..mesh.vertices() as u32).filter(|&v| mesh.is_odd(v)).collect(),
-        order: Vec::new(),
-        block: vec![[0; 2]; BLOCK + 3],
-        out: Vec::new(),
-    };
-    let mut chosen: Vec<[u32; 2]> = Vec::new();
+    let mut touched = Bits::default();
+    let mut edges = Edges::new(&mesh);
+    let mut chosen = Bits::default();
+    let mut ends_of_chosen: Vec<[u32; 2]> = Vec::new();
     let rules = Rules::new(&mesh, settings);
     let mut state = Batched { mesh, cost, rules, collapses: 0, max_cost: 0.0 };
     let mut starved = false;
@@ -37,35 +34,44 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
         edges.price(&state.mesh, state.cost, settings.max_cost);
         // A collapse takes two triangles.
         let wanted = (state.mesh.live_triangles() - settings.min_triangles).div_ceil(2);
-        let limit = edges.cheapest(wanted, if starved { 1.0 } else { SHARE });
+        let order = edges.prices.cheapest(wanted, if starved { 1.0 } else { SHARE });
         let before = state.collapses;
-        touched.clear();
-        chosen.clear();
-        for &key in &edges.order {
-            let (price, ends) = read(key);
-            if chosen.len() >= wanted || price > limit || state.mesh.live_triangles() <= settings.min_triangles {
-                break;
-            }
+        // The last few are not worth a pass for those that the rules refuse.
+        let at_once = starved || wanted * FEW < edges.ends.len();
+        touched.clear(state.mesh.vertices());
+        chosen.clear(edges.ends.len());
+        let mut found = 0;
+        for &e in order {
+            let ends = edges.ends[e as usize];
             if touched.has(ends[0]) || touched.has(ends[1]) {
                 continue;
             }
-            // Before the collapse: it changes the rings.
-            if !starved {
+            if !at_once {
+                // Before the collapse: it changes the rings.
                 state.touch(ends, &mut touched);
-                chosen.push(ends);
+                chosen.insert(e);
+                found += 1;
+                if found >= wanted {
+                    break;
+                }
             } else {
                 let mut best = [Candidate::FORBIDDEN];
                 state.cost.costs(&state.mesh, &[ends], &mut best);
                 if state.take(ends, &best[0]) {
                     state.touch(ends, &mut touched);
+                    let enough = (state.collapses - before) * FEW > edges.ends.len();
+                    if enough || state.mesh.live_triangles() <= settings.min_triangles {
+                        break;
+                    }
                 }
             }
         }
-        chosen.sort_unstable();
+        ends_of_chosen.clear();
+        chosen.for_each(|e| ends_of_chosen.push(edges.ends[e]));
         edges.out.clear();
-        edges.out.resize(chosen.len(), Candidate::FORBIDDEN);
-        state.cost.costs(&state.mesh, &chosen, &mut edges.out);
-        for (&ends, best) in chosen.iter().zip(&edges.out) {
+        edges.out.resize(found, Candidate::FORBIDDEN);
+        state.cost.costs(&state.mesh, &ends_of_chosen, &mut edges.out);
+        for (&ends, best) in ends_of_chosen.iter().zip(&edges.out) {
             if state.mesh.live_triangles() <= settings.min_triangles {
                 break;
             }
@@ -75,7 +81,7 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
         if starved && done == 0 {
             break;
         }
-        starved = done * 8 < chosen.len() || done == 0;
+        starved = done * 8 < found || done == 0;
     }
     state.mesh.finish(state.collapses, state.max_cost)
 }
@@ -90,15 +96,11 @@ struct Batched<'a, C: ?Sized> {
 
 impl<C: Cost + ?Sized> Batched<'_, C> {
     /// Marks the vertices whose edges change price when this edge is collapsed, or has just been.
-    fn touch(&self, ends: [u32; 2], touched: &mut Marks) {
+    fn touch(&self, ends: [u32; 2], touched: &mut Bits) {
         for v in ends {
             touched.insert(v);
             if self.cost.reach() == Reach::Ring {
-                self.mesh
-                    .triangles_of(v)
-                    .iter()
-                    .flat_map(|&t| self.mesh.corners(t))
-                    .for_each(|x| _ = touched.insert(x));
+                self.mesh.triangles_of(v).iter().flat_map(|&t| self.mesh.corners(t)).for_each(|x| touched.insert(x));
             }
         }
     }
@@ -122,17 +124,37 @@ struct Edges {
     living: Vec<u32>,
     /// The odd vertices.
     odd: Vec<u32>,
-    /// Edges that may be collapsed, as [`sortable`].
-    order: Vec<u128>,
+    /// Edges that may be collapsed, in the order of their triangles, some twice where the mesh is not a manifold.
+    ends: Vec<[u32; 2]>,
+    /// What they cost.
+    prices: Prices,
     block: Vec<[u32; 2]>,
     out: Vec<Candidate>,
 }
 
 impl Edges {
-    /// Fills `order` with every edge that may be collapsed, some twice where the mesh is not a manifold.
+    fn new(mesh: &LiveMesh) -> Self {
+        Self {
+            living: (0..mesh.all_triangles() as u32).collect(),
+            odd: (0..mesh.vertices() as u32).filter(|&v| mesh.is_odd(v)).collect(),
+            ends: Vec::new(),
+            prices: Prices::default(),
+            block: vec![[0; 2]; BLOCK + 3],
+            out: Vec::new(),
+        }
+    }
+
+    /// Prices every edge.
     fn price<C: Cost + ?Sized>(&mut self, mesh: &LiveMesh, cost: &mut C, max_cost: f32) {
-        self.order.clear();
-        self.living.retain(|&t| mesh.is_alive(t));
+        self.ends.clear();
+        self.prices.clear();
+        let mut alive = 0;
+        for i in 0..self.living.len() {
+            let t = self.living[i];
+            self.living[alive] = t;
+            alive += mesh.is_alive(t) as usize;
+        }
+        self.living.truncate(alive);
         let mut filled = 0;
         for i in 0..self.living.len() {
             // A balanced edge runs up its ids in one of its triangles. No branch: it would be mispredicted every other time.
@@ -170,38 +192,14 @@ impl Edges {
         cost.costs(mesh, &self.block[..filled], &mut self.out);
         for (&ends, c) in self.block.iter().zip(&self.out) {
             if c.cost <= max_cost && c.cost < f32::INFINITY {
-                self.order.push(sortable(c.cost, ends));
+                self.ends.push(ends);
+                self.prices.push(c.cost);
             }
         }
-    }
-
-    /// Keeps the cheapest `share` in `order`, sorted, and returns the price at which the pass should end.
-    fn cheapest(&mut self, wanted: usize, share: f32) -> f32 {
-        let keep = ((self.order.len() as f32 * share) as usize).max(64).min(self.order.len());
-        if keep < self.order.len() {
-            self.order.select_nth_unstable(keep);
-            self.order.truncate(keep);
-        }
-        self.order.sort_unstable();
-        if share < 1.0 && wanted < keep { read(self.order[wanted]).0 * SLACK } else { f32::MAX }
     }
 }
 
 /// Whether a triangle runs from a to b.
 fn runs(mesh: &LiveMesh, a: u32, b: u32) -> bool {
     mesh.triangles_of(a).iter().any(|&t| others(mesh.corners(t), a)[0] == b)
-}
-
-/// An integer that orders as (price, ends) do.
-fn sortable(price: f32, [a, b]: [u32; 2]) -> u128 {
-    // + 0.0: -0 and 0 are one price.
-    let bits = (price + 0.0).to_bits();
-    let bits = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
-    (bits as u128) << 64 | (a as u128) << 32 | b as u128
-}
-
-fn read(key: u128) -> (f32, [u32; 2]) {
-    let bits = (key >> 64) as u32;
-    let price = f32::from_bits(if bits >> 31 == 1 { bits & !(1 << 31) } else { !bits });
-    (price, [(key >> 32) as u32, key as u32])
 }

@@ -5,21 +5,28 @@
 //! neighbours' too). An edge that the rules refuse is held and comes back when a triangle at one of its ends has changed.
 //!
 //! What limits it: memory latency. A collapse touches some 12 triangles, 14 vertices and 20 edges that lie where they lay in the
-//! input; in the heap, a price that falls below the current limit moves through about log4 of its length.
+//! input. Loops over rings have no branches that depend on data, beside their ends: those cost as much as memory does.
 
-use super::mesh::{LiveMesh, corner, others};
+use super::mesh::{LiveMesh, corner, has};
+use super::prices::Bits;
 use super::queue::Queue;
 use super::rules::Rules;
+use super::spots::Spots;
 use super::{BLOCK, Candidate, Collapsed, Cost, Reach, Settings, resolve};
 
 struct Exact<'a, C: ?Sized> {
     mesh: LiveMesh,
     cost: &'a mut C,
     queue: Queue,
+    spots: Spots,
+    /// Vertices that may have held edges.
+    held: Bits,
     /// Edge k of a triangle joins its corners k and k + 1.
     edges_of: Vec<[u32; 3]>,
     /// Neighbours that the collapse at hand leaves without an edge to the survivor.
     left: Vec<u32>,
+    /// The third vertices of the triangles of the edge at hand.
+    apexes: Vec<u32>,
     prices: Prices,
 }
 
@@ -61,6 +68,7 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
         state.cost.costs(&state.mesh, &[ends], &mut best);
         if best[0].cost.is_nan() || best[0].cost == f32::INFINITY || !rules.allow(&state.mesh, ends, best[0].place) {
             state.queue.hold(edge);
+            ends.iter().for_each(|&v| state.held.insert(v));
             continue;
         }
         let (from, onto, at) = resolve(&state.mesh, ends, best[0].place);
@@ -78,14 +86,25 @@ impl<'a, C: Cost + ?Sized> Exact<'a, C> {
     fn new(mesh: LiveMesh, cost: &'a mut C, max_cost: f32) -> Self {
         let vertices = mesh.vertices();
         let mut edges_of = vec![[0; 3]; mesh.all_triangles()];
-        let mut queue = Queue::new(vertices, max_cost);
+        let mut queue = Queue::new(max_cost);
+        let mut spots = Spots::new(vertices);
+        let mut held = Bits::default();
+        held.clear(vertices);
         for v in 0..vertices as u32 {
-            queue.unmark();
-            for &t in mesh.triangles_of(v) {
-                for (k, x) in spokes(mesh.corners(t), v) {
-                    if x > v {
-                        let next = queue.len() as u32;
-                        edges_of[t as usize][k] = queue.mark(x, next).unwrap_or_else(|| queue.add([v, x]));
+            spots.clear();
+            // The first time that a plain edge is met, if its triangles are looked at in this order, is the one that runs forwards.
+            let plain = !mesh.is_odd(v) && !mesh.is_border(v);
+            for way in [0, 1] {
+                for &t in mesh.triangles_of(v) {
+                    let (k, x) = spokes(mesh.corners(t), v)[way];
+                    if x < v {
+                        continue;
+                    }
+                    let known = if plain && way == 0 { None } else { spots.get(x) };
+                    let edge = known.unwrap_or_else(|| queue.add([v, x]));
+                    edges_of[t as usize][k] = edge;
+                    if way == 0 || !plain {
+                        spots.insert(x, edge);
                     }
                 }
             }
@@ -103,25 +122,35 @@ impl<'a, C: Cost + ?Sized> Exact<'a, C> {
                 queue.set(e, prices.ends[i], prices.out[i].cost);
             }
         }
-        Self { mesh, cost, queue, edges_of, left: Vec::new(), prices }
+        Self { mesh, cost, queue, spots, held, edges_of, left: Vec::new(), apexes: Vec::new(), prices }
     }
 
     /// Gives the edges of `from` over to `onto` before the mesh does so with the triangles: an edge to a common neighbour
     /// becomes the one that `onto` has already.
     fn merge_edges(&mut self, edge: u32, from: u32, onto: u32) {
-        let Self { mesh, queue, edges_of, left, .. } = self;
+        let Self { mesh, queue, spots, edges_of, apexes, left, .. } = self;
         queue.remove(edge);
-        queue.unmark();
+        spots.clear();
+        apexes.clear();
+        apexes.resize(mesh.triangles_of(onto).len() + 1, 0);
+        let mut filled = 0;
+        // Balanced edges are met once or more often each way: one way will do.
+        let ways = 1 + mesh.is_odd(onto) as usize;
         for &t in mesh.triangles_of(onto) {
-            for (k, x) in spokes(mesh.corners(t), onto) {
-                queue.mark(x, edges_of[t as usize][k]);
+            let around = spokes(mesh.corners(t), onto);
+            for (k, x) in &around[..ways] {
+                spots.insert(*x, edges_of[t as usize][*k]);
             }
+            let [x, y] = around.map(|s| s.1);
+            apexes[filled] = x ^ y ^ from;
+            filled += ((x == from) | (y == from)) as usize;
         }
+        apexes.truncate(filled);
         for &t in mesh.triangles_of(from) {
             for (k, x) in spokes(mesh.corners(t), from) {
+                // `onto` itself is not on its ring.
                 let e = &mut edges_of[t as usize][k];
-                if x != onto
-                    && let Some(kept) = queue.mark(x, *e)
+                if let Some(kept) = spots.get(x)
                     && kept != *e
                 {
                     queue.remove(*e);
@@ -129,20 +158,18 @@ impl<'a, C: Cost + ?Sized> Exact<'a, C> {
                 }
             }
         }
-        // An edge that only dying triangles have dies with them.
+        // An edge that only dying triangles have dies with them. A balanced one has one more.
         left.clear();
-        for &t in mesh.triangles_of(onto) {
-            let corners = mesh.corners(t);
-            if !corners.contains(&from) {
-                continue;
-            }
-            let [x, y] = others(corners, onto);
-            let w = x ^ y ^ from;
+        let twice = || apexes.iter().enumerate().any(|(i, w)| apexes[..i].contains(w));
+        if ways == 1 && !twice() {
+            return;
+        }
+        for &w in apexes.iter() {
             let keeps = |v, partner| {
-                mesh.triangles_of(v).iter().map(|&t| mesh.corners(t)).any(|c| c.contains(&w) && !c.contains(&partner))
+                mesh.triangles_of(v).iter().map(|&t| mesh.corners(t)).any(|c| has(c, w) && !has(c, partner))
             };
             if !keeps(onto, from) && !keeps(from, onto) {
-                if let Some(e) = queue.mark(w, edge) {
+                if let Some(e) = spots.get(w) {
                     queue.remove(e);
                 }
                 left.push(w);
@@ -152,15 +179,13 @@ impl<'a, C: Cost + ?Sized> Exact<'a, C> {
 
     /// Asks the costs of all edges that the collapse onto `v` may have changed, and lets held ones near it try again.
     fn reprice(&mut self, v: u32) {
-        let Self { mesh, cost, queue, edges_of, left, prices } = self;
+        let Self { mesh, cost, queue, held, edges_of, left, prices, .. } = self;
         prices.clear();
-        queue.unmark();
+        // Some twice where the mesh is not a manifold.
+        let ways = 1 + mesh.is_odd(v) as usize;
         for &t in mesh.triangles_of(v) {
-            for (k, x) in spokes(mesh.corners(t), v) {
-                let e = edges_of[t as usize][k];
-                if queue.mark(x, e).is_none() {
-                    prices.push(e, v, x);
-                }
+            for (k, x) in &spokes(mesh.corners(t), v)[..ways] {
+                prices.push(edges_of[t as usize][*k], v, *x);
             }
         }
         let own = prices.ids.len();
@@ -175,7 +200,8 @@ impl<'a, C: Cost + ?Sized> Exact<'a, C> {
                         }
                     }
                 }
-            } else if queue.held_at(w) > 0 {
+            } else if held.has(w) {
+                held.remove(w);
                 for &t in mesh.triangles_of(w) {
                     spokes(mesh.corners(t), w).iter().for_each(|&(k, _)| queue.release(edges_of[t as usize][k]));
                 }
@@ -208,7 +234,7 @@ impl Prices {
 /// The end of an edge beside `v`.
 #[inline]
 fn other(ends: [u32; 2], v: u32) -> u32 {
-    if ends[0] == v { ends[1] } else { ends[0] }
+    ends[0] ^ ends[1] ^ v
 }
 
 /// The two edges of a triangle at its corner `v`, each with its other end.

@@ -1,7 +1,7 @@
 //! Prices of four edges at a time: a vector's lanes are four edges.
 //!
 //! A vertex is one cache line of four rows of four numbers, so four vertices become lanes by four 4 x 4 transpositions. The formulas
-//! are those of [`super::quadric`], which has the words. Plain [`glam::Vec4`]: SSE2 or NEON where there is one.
+//! are those of [`super::quadric`], which has the words. Arrays are spelt out: a map over one is not always inlined. Plain [`glam::Vec4`]: SSE2 or NEON where there is one.
 
 use glam::{Mat4, Vec3, Vec4};
 
@@ -82,6 +82,11 @@ impl Lanes {
         }
     }
 
+    #[inline]
+    fn of_both([p, q, r, s]: [(&Vertex, &Vertex); 4]) -> (Self, Self) {
+        (Self::of([p.0, q.0, r.0, s.0]), Self::of([p.1, q.1, r.1, s.1]))
+    }
+
     /// A x.
     #[inline]
     fn times(&self, [x, y, z]: [Vec4; 3]) -> [Vec4; 3] {
@@ -130,20 +135,23 @@ impl Lanes {
         let (xx_, xy_, xz_) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
         let (yy_, yz_, zz_) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);
         let over = 1.0 / (xx * xx_ + xy * xy_ + xz * xz_);
-        let r = [0, 1, 2].map(|k| ridge * middle[k] - self.b[k]);
+        let r = |k: usize| ridge * middle[k] - self.b[k];
+        let r = [r(0), r(1), r(2)];
         let x = [
             (xx_ * r[0] + xy_ * r[1] + xz_ * r[2]) * over,
             (xy_ * r[0] + yy_ * r[1] + yz_ * r[2]) * over,
             (xz_ * r[0] + yz_ * r[1] + zz_ * r[2]) * over,
         ];
         let finite = (x[0] + x[1] + x[2]).is_finite_mask();
-        [0, 1, 2].map(|k| Vec4::select(finite, x[k], middle[k]))
+        let or_middle = |k: usize| Vec4::select(finite, x[k], middle[k]);
+        [or_middle(0), or_middle(1), or_middle(2)]
     }
 }
 
 #[inline]
 fn offset(a: &Lanes, b: &Lanes) -> [Vec4; 3] {
-    [0, 1, 2].map(|k| b.position[k] - a.position[k])
+    let d = |k: usize| b.position[k] - a.position[k];
+    [d(0), d(1), d(2)]
 }
 
 /// The mean square distance to the planes of the vertex that dies, and whether it is the first.
@@ -152,34 +160,34 @@ fn onto_an_end(a: &Lanes, b: &Lanes, d: [Vec4; 3]) -> (Vec4, [bool; 4]) {
     // A locked vertex does not die.
     let forbid = |v: &Lanes, mean: Vec4| Vec4::select(v.locked.cmpgt(Vec4::ZERO), Vec4::INFINITY, mean);
     let first_dies = forbid(a, a.mean_square(d));
-    let second_dies = forbid(b, b.mean_square(d.map(|x| -x)));
+    let second_dies = forbid(b, b.mean_square([-d[0], -d[1], -d[2]]));
     (first_dies.min(second_dies), first_dies.cmplt(second_dies).into())
 }
 
 /// Prices with the survivor at an end, in the unit of `size`.
 #[inline]
 pub(super) fn half_edge(four: [(&Vertex, &Vertex); 4], size: f32) -> [Candidate; 4] {
-    let (a, b) = (Lanes::of(four.map(|e| e.0)), Lanes::of(four.map(|e| e.1)));
+    let (a, b) = Lanes::of_both(four);
     let (mean, first_dies) = onto_an_end(&a, &b, offset(&a, &b));
-    let mean = mean.to_array();
-    [0, 1, 2, 3].map(|i| Candidate {
-        cost: mean[i].sqrt() * size,
-        place: if first_dies[i] { Place::Second } else { Place::First },
-    })
+    let mean = (mean.sqrt() * size).to_array();
+    let candidate =
+        |i: usize| Candidate { cost: mean[i], place: if first_dies[i] { Place::Second } else { Place::First } };
+    [candidate(0), candidate(1), candidate(2), candidate(3)]
 }
 
 /// Prices with the survivor where the error is least, in the unit of `size`; at an end where the other one is locked.
 #[inline]
 pub(super) fn optimal(four: [(&Vertex, &Vertex); 4], size: f32) -> [Candidate; 4] {
-    let (mut a, b) = (Lanes::of(four.map(|e| e.0)), Lanes::of(four.map(|e| e.1)));
+    let (mut a, b) = Lanes::of_both(four);
     let locked = (a.locked + b.locked).to_array();
     let d = offset(&a, &b);
     a.add_from(&b, d);
-    let x = a.minimum(d.map(|x| 0.5 * x));
-    let mean = a.mean_square(x).to_array();
-    let at = [0, 1, 2].map(|k| ((a.position[k] + x[k]) * size).to_array());
-    let mut out = [0, 1, 2, 3]
-        .map(|i| Candidate { cost: mean[i].sqrt() * size, place: Place::At(Vec3::new(at[0][i], at[1][i], at[2][i])) });
+    let x = a.minimum([0.5 * d[0], 0.5 * d[1], 0.5 * d[2]]);
+    let mean = (a.mean_square(x).sqrt() * size).to_array();
+    let at = |k: usize| ((a.position[k] + x[k]) * size).to_array();
+    let at = [at(0), at(1), at(2)];
+    let candidate = |i: usize| Candidate { cost: mean[i], place: Place::At(Vec3::new(at[0][i], at[1][i], at[2][i])) };
+    let mut out = [candidate(0), candidate(1), candidate(2), candidate(3)];
     if locked != [0.0; 4] {
         let ends = half_edge(four, size);
         (0..4).filter(|&i| locked[i] > 0.0).for_each(|i| out[i] = ends[i]);

@@ -4,25 +4,27 @@
 //! writes the survivor's merged run at the list's end, and the list is squeezed when it has doubled. Runs stay contiguous, so
 //! walking a one-ring is a linear read; a squeeze is paid for by the appends since the last one.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use super::Collapsed;
+use super::rings::Rings;
 use crate::Fault;
 
 /// Marks a dead triangle's first corner.
-const DEAD: u32 = u32::MAX;
+pub(super) const DEAD: u32 = u32::MAX;
 
 const LOCKED: u8 = 1;
 /// One of its edges has other than two triangles.
-const BORDER: u8 = 2;
+pub(super) const BORDER: u8 = 2;
 /// One of its edges has not as many triangles running forwards as backwards.
-const ODD: u8 = 4;
+pub(super) const ODD: u8 = 4;
 
 /// What is known of a vertex: one fetch from memory.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
 struct Vertex {
-    position: Vec3,
+    /// And 0: four such rows become lanes without a copy.
+    position: Vec4,
     /// Its run in the list of triangles.
     start: u32,
     len: u32,
@@ -40,6 +42,8 @@ pub struct LiveMesh {
     /// Squeeze `lists` at this length.
     squeeze_at: usize,
     live: usize,
+    /// Triangles of the edge that collapses, each with its third vertex.
+    dying: Vec<[u32; 2]>,
     /// A power of two that brings the mesh to about unit size: products of several lengths neither over- nor underflow.
     unit: f32,
 }
@@ -61,78 +65,44 @@ impl LiveMesh {
         if indices.len() / 3 > 1 << 29 || n >= DEAD as usize {
             return bad(format!("{} triangles and {n} vertices are too many", indices.len() / 3));
         }
-        if let Some(i) = indices.iter().position(|&i| i as usize >= n) {
+        // The highest first: unlike a search it is vectors' work.
+        if indices.iter().copied().max().is_some_and(|most| most as usize >= n) {
+            let i = indices.iter().position(|&i| i as usize >= n).unwrap_or_default();
             return bad(format!("triangle {} names vertex {} of {n}", i / 3, indices[i]));
         }
         if !locked.is_empty() && locked.len() != n {
             return bad(format!("{} lock flags for {n} vertices", locked.len()));
         }
-        let proper = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
-        let triangles: Vec<[u32; 3]> = indices
-            .chunks_exact(3)
-            .map(|t| [t[0], t[1], t[2]])
-            .map(|t| if proper(&t) { t } else { [DEAD; 3] })
-            .collect();
+        let mut triangles = indices.as_chunks::<3>().0.to_vec();
+        for t in &mut triangles {
+            if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
+                *t = [DEAD; 3];
+            }
+        }
+        let rings = Rings::new(n, &triangles);
+        let flags = rings.borders();
         let vertex = |(i, &position): (usize, &Vec3)| {
-            let flags = if locked.get(i) == Some(&true) { LOCKED } else { 0 };
-            Vertex { position, start: 0, len: 0, remap: i as u32, flags }
+            let (start, end) = rings.range(i);
+            let locked = if locked.get(i) == Some(&true) { LOCKED } else { 0 };
+            Vertex {
+                position: position.extend(0.0),
+                start: start as u32,
+                len: (end - start) as u32,
+                remap: i as u32,
+                flags: flags[i] | locked,
+            }
         };
-        let mut mesh = Self {
-            vertices: positions.iter().enumerate().map(vertex).collect(),
+        let vertices = positions.iter().enumerate().map(vertex).collect();
+        let lists = rings.triangles;
+        Ok(Self {
+            vertices,
             triangles,
-            lists: Vec::with_capacity(indices.len() * 2),
-            squeeze_at: 0,
-            live: 0,
+            live: lists.len() / 3,
+            dying: Vec::new(),
+            squeeze_at: (2 * lists.len()).max(1024),
+            lists,
             unit: unit(positions),
-        };
-        mesh.list_triangles();
-        mesh.find_borders();
-        Ok(mesh)
-    }
-
-    /// Fills the vertices' runs and `lists`: counting sort of corners by vertex.
-    fn list_triangles(&mut self) {
-        let living = || self.triangles.iter().enumerate().filter(|(_, t)| t[0] != DEAD);
-        for (_, t) in living() {
-            t.iter().for_each(|&v| self.vertices[v as usize].len += 1);
-        }
-        let mut end = 0;
-        for v in &mut self.vertices {
-            (v.start, end) = (end, end + v.len);
-            v.len = 0;
-        }
-        self.lists.resize(end as usize, 0);
-        for (i, t) in living() {
-            for &v in t {
-                let v = &mut self.vertices[v as usize];
-                self.lists[(v.start + v.len) as usize] = i as u32;
-                v.len += 1;
-            }
-        }
-        self.live = end as usize / 3;
-        self.squeeze_at = (2 * self.lists.len()).max(1024);
-    }
-
-    fn find_borders(&mut self) {
-        // Triangles that run from the vertex at hand to this one, and back.
-        let mut count = vec![[0u32; 2]; self.vertices.len()];
-        for v in 0..self.vertices.len() as u32 {
-            for &t in self.triangles_of(v) {
-                let [next, last] = others(self.corners(t), v);
-                count[next as usize][0] += 1;
-                count[last as usize][1] += 1;
-            }
-            let mut flags = 0;
-            for &t in self.triangles_of(v) {
-                for x in others(self.corners(t), v) {
-                    // Emptied at the first look; later ones see a balanced pair.
-                    let [forth, back] = std::mem::take(&mut count[x as usize]);
-                    flags |=
-                        if forth != back { ODD } else { 0 } | if matches!(forth + back, 0 | 2) { 0 } else { BORDER };
-                }
-            }
-            self.vertices[v as usize].flags |= flags;
-        }
+        })
     }
 
     /// Number of vertices, dead and isolated ones included.
@@ -144,6 +114,12 @@ impl LiveMesh {
     /// Where a vertex is.
     #[inline]
     pub fn position(&self, vertex: u32) -> Vec3 {
+        self.vertices[vertex as usize].position.truncate()
+    }
+
+    /// Where a vertex is, and 0.
+    #[inline]
+    pub(super) fn row(&self, vertex: u32) -> Vec4 {
         self.vertices[vertex as usize].position
     }
 
@@ -216,45 +192,63 @@ impl LiveMesh {
             self.squeeze();
         }
         let start = self.lists.len();
-        let Vertex { start: first, len, .. } = self.vertices[onto as usize];
-        for i in first as usize..(first + len) as usize {
-            let t = self.lists[i];
-            if !self.triangles[t as usize].contains(&from) {
-                self.lists.push(t);
-            }
+        let run = |v: u32| {
+            let Vertex { start, len, .. } = self.vertices[v as usize];
+            start as usize..(start + len) as usize
+        };
+        let (stays, comes) = (run(onto), run(from));
+        self.lists.resize(start + stays.len() + comes.len(), 0);
+        let (old, new) = self.lists.split_at_mut(start);
+        // Written always and kept if alive: branches would be mispredicted at every other collapse.
+        let mut filled = 0;
+        for &t in &old[stays] {
+            new[filled] = t;
+            filled += !has(self.triangles[t as usize], from) as usize;
         }
-        let Vertex { start: first, len, .. } = self.vertices[from as usize];
-        for i in first as usize..(first + len) as usize {
-            let t = self.lists[i];
+        self.dying.clear();
+        for &t in &old[comes] {
             let corners = &mut self.triangles[t as usize];
-            if corners.contains(&onto) {
-                let third = corners.iter().copied().find(|&x| x != from && x != onto);
-                *corners = [DEAD; 3];
-                self.live -= 1;
-                if let Some(w) = third {
-                    self.unlist(w, t);
-                }
-            } else {
-                corners.iter_mut().filter(|x| **x == from).for_each(|x| *x = onto);
-                self.lists.push(t);
+            let dies = has(*corners, onto);
+            if dies {
+                let third = corners[0] ^ corners[1] ^ corners[2] ^ from ^ onto;
+                self.dying.push([t, third]);
             }
+            *corners = corners.map(|x| {
+                if dies {
+                    DEAD
+                } else if x == from {
+                    onto
+                } else {
+                    x
+                }
+            });
+            new[filled] = t;
+            filled += !dies as usize;
+        }
+        self.lists.truncate(start + filled);
+        self.live -= self.dying.len();
+        for i in 0..self.dying.len() {
+            let [t, third] = self.dying[i];
+            self.unlist(third, t);
         }
         let dying = &mut self.vertices[from as usize];
         (dying.start, dying.len, dying.remap) = (0, 0, onto);
         let flags = dying.flags;
         let stays = &mut self.vertices[onto as usize];
         (stays.start, stays.len) = (start as u32, (self.lists.len() - start) as u32);
-        stays.position = at;
+        stays.position = at.extend(0.0);
         stays.flags |= flags & (BORDER | ODD);
     }
 
     fn unlist(&mut self, vertex: u32, triangle: u32) {
         let Vertex { start, len, .. } = &mut self.vertices[vertex as usize];
         let run = &mut self.lists[*start as usize..(*start + *len) as usize];
-        if let Some(i) = run.iter().position(|&t| t == triangle) {
-            run.copy_within(i + 1.., i);
-            *len -= 1;
+        let mut kept = 0;
+        for i in 0..run.len() {
+            run[kept] = run[i];
+            kept += (run[i] != triangle) as usize;
         }
+        *len = kept as u32;
     }
 
     fn squeeze(&mut self) {
@@ -287,7 +281,7 @@ impl LiveMesh {
             out.indices.extend_from_slice(t);
             out.triangles.push(i as u32);
         }
-        out.positions = self.vertices.iter().map(|v| v.position).collect();
+        out.positions = self.vertices.iter().map(|v| v.position.truncate()).collect();
         out.remap = remap;
         out
     }
@@ -298,6 +292,12 @@ impl LiveMesh {
 pub(super) fn corner(t: [u32; 3], v: u32) -> [usize; 3] {
     const TURNS: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
     TURNS[((t[1] == v) as usize) | (((t[2] == v) as usize) << 1)]
+}
+
+/// Whether `v` is a corner. No branch.
+#[inline]
+pub(super) fn has(t: [u32; 3], v: u32) -> bool {
+    (t[0] == v) | (t[1] == v) | (t[2] == v)
 }
 
 /// The two vertices of a triangle beside `v`, in the triangle's order beginning after `v`.

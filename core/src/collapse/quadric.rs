@@ -106,7 +106,8 @@ impl Quadrics {
         let mut vertices: Vec<Vertex> = (0..mesh.vertices() as u32).map(vertex).collect();
         for t in (0..mesh.all_triangles() as u32).filter(|&t| mesh.is_alive(t)) {
             let corners = mesh.corners(t);
-            let p = corners.map(|v| vertices[v as usize].position());
+            let at = |k: usize| vertices[corners[k] as usize].position();
+            let p = [at(0), at(1), at(2)];
             let twice_area = (p[1] - p[0]).cross(p[2] - p[0]);
             let length = twice_area.length();
             if !(length.is_finite() && length > 0.0) {
@@ -136,14 +137,19 @@ impl Cost for Quadrics {
         // A power of two, so exact.
         let size = 1.0 / mesh.unit();
         let ends = |&[a, b]: &[u32; 2]| (&self.vertices[a as usize], &self.vertices[b as usize]);
-        for (edges, out) in edges.chunks(4).zip(out.chunks_mut(4)) {
-            // The last chunk's free lanes repeat its first edge.
-            let four = [0, 1, 2, 3].map(|i| ends(edges.get(i).unwrap_or(&edges[0])));
-            let prices = match self.placement {
-                Placement::HalfEdge => lanes::half_edge(four, size),
-                Placement::Optimal => lanes::optimal(four, size),
-            };
-            out.copy_from_slice(&prices[..edges.len()]);
+        let price = |four| match self.placement {
+            Placement::HalfEdge => lanes::half_edge(four, size),
+            Placement::Optimal => lanes::optimal(four, size),
+        };
+        let (fours, rest) = edges.as_chunks::<4>();
+        let (out_fours, out_rest) = out.as_chunks_mut::<4>();
+        for (four, out) in fours.iter().zip(out_fours) {
+            *out = price([ends(&four[0]), ends(&four[1]), ends(&four[2]), ends(&four[3])]);
+        }
+        if let Some(first) = rest.first() {
+            // The free lanes repeat the first edge.
+            let prices = price([0, 1, 2, 3].map(|i| ends(rest.get(i).unwrap_or(first))));
+            out_rest.iter_mut().zip(prices).for_each(|(out, price)| *out = price);
         }
     }
 
