@@ -8,8 +8,8 @@ use farfield_core::registry::{Entry, Kind, settings_of};
 
 pub use {
     farfield_far_baselines as far_baselines, farfield_far_textured_mesh as far_textured_mesh,
-    farfield_metrics as metrics, farfield_partition_hex as partition_hex,
-    farfield_partition_single_cell as partition_single_cell, farfield_schedulers as schedulers,
+    farfield_metrics as metrics, farfield_partition_adaptive_grid as partition_adaptive_grid,
+    farfield_partition_hex as partition_hex, farfield_partition_single_cell as partition_single_cell, farfield_schedulers as schedulers,
 };
 
 /// The paper of the textured LOD meshes, before a section's number.
@@ -35,6 +35,13 @@ pub fn registry() -> Vec<Entry> {
             summary: "Distant objects as small meshes that wear pictures of themselves",
             source: textured!("3.1.2-3.1.5 and 3.2"),
             settings: settings_of::<far_textured_mesh::TexturedLodMesh>(),
+        },
+        Entry {
+            kind: Kind::Partition,
+            name: "adaptive-grid",
+            summary: "A grid of viewpoints, as dense as a triangle budget for every view demands",
+            source: "Automatic image placement (Aliaga, Lastra 1999), sections 3 and 5",
+            settings: settings_of::<partition_adaptive_grid::AdaptiveGrid>(),
         },
         Entry {
             kind: Kind::Partition,

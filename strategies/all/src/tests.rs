@@ -46,8 +46,10 @@ fn the_list_is_sorted_and_is_what_serde_knows() {
 /// The least table of a strategy: its name and the settings that have no default, each with a value its type allows.
 fn least(e: &Entry) -> Map<String, Value> {
     let mut table = Map::from_iter([("type".to_owned(), json!(e.name))]);
-    if e.name == "hex-cells" {
-        table.insert("edge".into(), json!(50.0));
+    match e.name {
+        "adaptive-grid" => drop(table.insert("budget".into(), json!(150_000))),
+        "hex-cells" => drop(table.insert("edge".into(), json!(50.0))),
+        _ => {}
     }
     table
 }
