@@ -2,4 +2,6 @@
 
 pub mod conformance;
 pub mod lab;
+pub mod pair;
 pub mod stones;
+pub mod turned;
