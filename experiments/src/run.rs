@@ -333,6 +333,7 @@ fn row(pipeline: &str, frame: usize, w: &Walked) -> FrameRow {
         near_triangles: w.near_triangles,
         far_triangles: w.far_triangles,
         missing_blocks: w.missing,
+        uploaded_bytes: w.uploaded_bytes,
         texture_bytes: w.texture_bytes,
         ..FrameRow::default()
     }
