@@ -1,5 +1,7 @@
 //! Conformance, parity, golden images, the matrix.
 
+#[cfg(doctest)]
+mod book;
 pub mod conformance;
 pub mod lab;
 pub mod pair;
