@@ -5,6 +5,8 @@
 
 mod args;
 mod commands;
+#[cfg(test)]
+mod quoted;
 
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -215,6 +215,8 @@ pub struct FrameRow {
     pub points: u64,
     /// Far blocks that were not resident.
     pub missing_blocks: u32,
+    /// Bytes of blocks that the scheduler had uploaded for it.
+    pub uploaded_bytes: u64,
     /// Texels resident, bytes.
     pub texture_bytes: u64,
     /// Whole-frame PSNR, decibels; empty where the frame was not measured.

@@ -347,6 +347,7 @@ fn row(pipeline: &str, frame: usize, w: &Walked) -> FrameRow {
         far_triangles: w.far_triangles,
         points: w.samples,
         missing_blocks: w.missing,
+        uploaded_bytes: w.uploaded_bytes,
         texture_bytes: w.texture_bytes,
         ..FrameRow::default()
     }

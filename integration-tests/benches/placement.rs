@@ -102,12 +102,14 @@ fn one(triangles: u64, budget: u64, bake: usize) -> Result<Row, Error> {
         1e2 * percentile(&off, 0.95),
     );
     if bake > 0 && !with.is_empty() {
-        let chosen: Vec<CellId> = (0..bake.min(with.len())).map(|i| with[i * with.len() / bake.min(with.len())].outline.id).collect();
+        let chosen: Vec<CellId> =
+            (0..bake.min(with.len())).map(|i| with[i * with.len() / bake.min(with.len())].outline.id).collect();
         let of_chosen: usize = chosen.iter().map(|c| insides[c.index()].sectors.len()).sum();
         prepared.divisions[0].needed = chosen;
         let store = Store::open(folder.path(), Box::new(|m| eprintln!("{m}")))?;
         let start = Instant::now();
-        let built = build_pipelines(&experiment, &prepared, &[0], &store, &options(folder.path())).map_err(|f| format!("{f:?}"))?;
+        let built = build_pipelines(&experiment, &prepared, &[0], &store, &options(folder.path()))
+            .map_err(|f| format!("{f:?}"))?;
         let seconds = start.elapsed().as_secs_f64();
         println!(
             "          {of_chosen} images in {seconds:.1} s, {:.2} s each, {:.0} kB each: all {images} in {:.1} min, {:.0} MB",
@@ -168,7 +170,11 @@ fn plot(file: &Path, rows: &[Row]) -> Result<(), Error> {
     let shares = || (20..=100).map(|i| f64::from(i) * 0.5);
     let lines: [(&str, RGBColor, Vec<(f64, f64)>); 2] = [
         ("best case", BLACK, shares().map(|p| (p, best(p / 100.0) / g)).collect()),
-        ("near-worst case", RGBColor(150, 150, 150), shares().map(|p| (p, near_worst(p / 100.0, levels) / g)).collect()),
+        (
+            "near-worst case",
+            RGBColor(150, 150, 150),
+            shares().map(|p| (p, near_worst(p / 100.0, levels) / g)).collect(),
+        ),
     ];
     for (name, color, points) in lines {
         let line = chart.draw_series(LineSeries::new(points, color))?;
@@ -197,7 +203,9 @@ fn main() -> Result<(), Error> {
             _ => return Err(format!("{name}: there are --bake, --plot and --triangles").into()),
         }
     }
-    println!("triangles | chunks |   budget | points |  need | images | a point | off target | off, p95 | divided | placed");
+    println!(
+        "triangles | chunks |   budget | points |  need | images | a point | off target | off, p95 | divided | placed"
+    );
     let mut rows = vec![];
     for p in [150_000, 200_000, 250_000, 300_000, 400_000] {
         rows.push(one(1_000_000, p, if p == 150_000 { bake } else { 0 })?);

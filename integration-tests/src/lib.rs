@@ -1,5 +1,9 @@
 //! Conformance, parity, golden images, the matrix.
 
+#[cfg(doctest)]
+mod book;
 pub mod conformance;
 pub mod lab;
+pub mod pair;
 pub mod stones;
+pub mod turned;

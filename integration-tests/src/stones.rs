@@ -75,6 +75,37 @@ pub fn write(file: &Path, mesh: TriangleMesh, places: &[DVec3]) {
     export(file, &scene).expect("a model file");
 }
 
+/// A folder with `stones.glb`: nine stones in two rows along x, beside the way that a path `line` takes through them.
+///
+/// # Panics
+/// When it cannot be written.
+pub fn folder() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let place = |i: u32| DVec3::new(f64::from(i / 2) * 12.0, 0.0, if i % 2 == 0 { -8.0 } else { 8.5 });
+    write(&dir.path().join("stones.glb"), stone(24, 32), &(0..9).map(place).collect::<Vec<_>>());
+    dir
+}
+
+/// An experiment in [`folder`]: a walk of nine frames between the rows, pictures of `resolution` pixels, and `pipelines`, the
+/// text of their tables.
+pub fn experiment(resolution: [u32; 2], pipelines: &str) -> String {
+    format!(
+        r#"
+        [scene]
+        path = "stones.glb"
+        [view]
+        resolution = {resolution:?}
+        eye_height = [1.5, 1.5]
+        near = 0.05
+        path = "line"
+        frames = 9
+        max_speed = 60.0
+        frames_per_s = 10
+        {pipelines}
+        "#
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

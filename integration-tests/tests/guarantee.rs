@@ -48,7 +48,10 @@ struct Found {
 
 /// The scene's bounds and triangles, loaded without an eye height of its own.
 fn measure(case: &Case<'_>) -> (f32, f32, u64) {
-    let text = format!("[scene]\n{}\n[view]\nframes = 1\npath = \"still\"\n[[pipeline]]\nname = \"all\"\nfar_field = {{ type = \"geometry\" }}", case.scene);
+    let text = format!(
+        "[scene]\n{}\n[view]\nframes = 1\npath = \"still\"\n[[pipeline]]\nname = \"all\"\nfar_field = {{ type = \"geometry\" }}",
+        case.scene
+    );
     let lab = Lab::new(&text, Path::new(".")).unwrap();
     let s = &lab.prepared.scene;
     (s.bounds.min.y, s.bounds.max.y, s.triangles())
@@ -149,7 +152,11 @@ fn check(case: &Case<'_>, pitch_deg: [f64; 2]) {
     };
     let all = (0..RUNS).into_par_iter().map(one).reduce(Found::default, add);
     let images: usize = insides.lock().unwrap().values().map(|c| c.sectors.len()).sum();
-    println!("{}, pitch {pitch_deg:?}: budget {budget}, {} points, {images} images at those used: {all:?}", case.name, cells.outlines().len());
+    println!(
+        "{}, pitch {pitch_deg:?}: budget {budget}, {} points, {images} images at those used: {all:?}",
+        case.name,
+        cells.outlines().len()
+    );
     assert_eq!((all.over_budget, all.unserved, all.behind), (0, 0, 0), "{}: {all:?}", case.name);
     // The test would be empty where no view needs an image, or where the budget never binds.
     assert!(all.with_image * 20 > all.views, "{}: {all:?}", case.name);

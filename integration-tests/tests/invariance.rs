@@ -9,7 +9,6 @@ use farfield_core::id::CellId;
 use farfield_experiments::config::BackendName;
 use farfield_integration_tests::lab::{Lab, backends, errors};
 use farfield_integration_tests::stones;
-use glam::DVec3;
 
 const FRAMES: [usize; 3] = [0, 1, 3];
 /// Edge of a cell: one for which no viewpoint stands on the border of two cells, where rounding would choose.
@@ -75,10 +74,7 @@ fn found(folder: &tempfile::TempDir, scale: f64, offset: f64, on: BackendName) -
 
 #[test]
 fn scale_and_place_change_neither_pictures_nor_counts() {
-    let folder = tempfile::tempdir().unwrap();
-    let places: Vec<DVec3> =
-        (0..9).map(|i| DVec3::new(f64::from(i / 2) * 12.0, 0.0, if i % 2 == 0 { -8.0 } else { 8.5 })).collect();
-    stones::write(&folder.path().join("stones.glb"), stones::stone(24, 32), &places);
+    let folder = stones::folder();
     for on in backends("invariance").into_iter().filter(|b| *b != BackendName::Vulkan) {
         let home = found(&folder, 1.0, 0.0, on);
         assert!(home[1..].iter().all(|h| h.stored > 1000 && (25.0..60.0).contains(&h.psnr_db)), "nothing is tried");

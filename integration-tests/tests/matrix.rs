@@ -11,7 +11,6 @@ use farfield_experiments::config::BackendName;
 use farfield_experiments::list::entries;
 use farfield_integration_tests::lab::{Lab, backends, errors};
 use farfield_integration_tests::stones;
-use glam::DVec3;
 
 /// Required settings: of what, and its value.
 const GIVEN: [(&str, &str, &str); 2] = [("adaptive-grid", "budget", "1000000"), ("hex-cells", "edge", "3.0")];
@@ -62,18 +61,8 @@ fn far_table(e: &Entry, more: &str) -> String {
 }
 
 fn experiment(partition: &str, far_field: &str) -> String {
-    format!(
+    let pipelines = format!(
         r#"
-        [scene]
-        path = "stones.glb"
-        [view]
-        resolution = [160, 120]
-        eye_height = [1.5, 1.5]
-        near = 0.05
-        path = "line"
-        frames = 9
-        max_speed = 60.0
-        frames_per_s = 10
         [[pipeline]]
         name = "all geometry"
         far_field = {{ type = "geometry", frustum_culling = false }}
@@ -82,16 +71,8 @@ fn experiment(partition: &str, far_field: &str) -> String {
         partition = {partition}
         far_field = {far_field}
         "#
-    )
-}
-
-fn folder() -> tempfile::TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    // Two rows along the path, which leads along x.
-    let places: Vec<DVec3> =
-        (0..9).map(|i| DVec3::new(f64::from(i / 2) * 12.0, 0.0, if i % 2 == 0 { -8.0 } else { 8.5 })).collect();
-    stones::write(&dir.path().join("stones.glb"), stones::stone(24, 32), &places);
-    dir
+    );
+    stones::experiment([160, 120], &pipelines)
 }
 
 /// The least PSNR and the most holes over the frames, and the far field's triangles; or the refusal.
@@ -120,7 +101,7 @@ fn check(what: &str, on: &[BackendName], found: &[(f64, f64, u64)]) {
 
 #[test]
 fn every_combination_runs_or_is_refused_in_so_many_words() {
-    let (folder, on) = (folder(), backends("matrix"));
+    let (folder, on) = (stones::folder(), backends("matrix"));
     let (partitions, far_fields) = (of(Kind::Partition), of(Kind::FarField));
     assert!(on.contains(&BackendName::Cpu) && partitions.len() >= 2 && far_fields.len() >= 2);
     let variants = |e: &Entry| -> Vec<String> {
@@ -149,7 +130,7 @@ fn every_combination_runs_or_is_refused_in_so_many_words() {
 
 #[test]
 fn every_choice_and_every_nested_strategy_of_a_far_field_runs() {
-    let folder = folder();
+    let folder = stones::folder();
     let hex = table(of(Kind::Partition).iter().find(|e| e.name == "hex-cells").unwrap(), "");
     let mut tried = 0;
     for f in of(Kind::FarField) {
@@ -173,7 +154,7 @@ fn every_choice_and_every_nested_strategy_of_a_far_field_runs() {
 
 #[test]
 fn one_view_and_several_both_run_with_either_metric_and_either_reading() {
-    let folder = folder();
+    let folder = stones::folder();
     let hex = table(of(Kind::Partition).iter().find(|e| e.name == "hex-cells").unwrap(), "");
     let textured = |more: String| format!("{{ type = \"textured-lod-mesh\", edge_px = 1.0, {more} }}");
     let mut far = vec![];

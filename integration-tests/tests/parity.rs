@@ -2,134 +2,25 @@
 //!
 //! Both run the same shaders on the same packed data, so on lavapipe (where both stacks compile the same code) nothing may
 //! differ. On other drivers, which may compile the two stacks' pipelines differently, a share of pixels may differ that the
-//! assertion caps at [`MAX_SHARE`]. Without a driver each test is a visible skip; with `FARFIELD_EXPECT_DEVICE=1` a skip is
-//! a failure.
+//! assertion caps ([`farfield_integration_tests::pair`]). Without a driver each test is a visible skip; with
+//! `FARFIELD_EXPECT_DEVICE=1` a skip is a failure.
 //!
-//! `cargo test --release -p farfield-integration-tests --test parity -- --ignored --nocapture` prints frame times of both.
+//! `benches/frame_times.rs` prints frame times of both.
 
 use std::collections::BTreeSet;
 
-use farfield_core::backend::{Backend, BlockData, Counted, upload_scene};
+use farfield_core::backend::{Backend, BlockData};
 use farfield_core::context::Shot;
-use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind, Shading};
-use farfield_core::id::{AssetId, Block, LocalPayload, MaterialId, PayloadRef, TargetId, TextureId};
-use farfield_core::image::{Picture, SurfaceImage};
-use farfield_core::mesh::TriangleMesh;
+use farfield_core::draw::DrawWhat;
+use farfield_core::id::{AssetId, Block, LocalPayload, PayloadRef, TextureId};
 use farfield_core::payload::{AtlasPart, MeshPart, Part, Payload, ProjectedPart, Projector};
-use farfield_core::scene::{Light, LightKind, Material, Placement, Scene, SceneBuilder, Texture};
+use farfield_core::scene::{Material, Placement, Scene, SceneBuilder, Texture};
 use farfield_core::{Aabb, Camera};
-use farfield_vulkan::VulkanBackend;
-use farfield_wgpu::WgpuBackend;
-use glam::{DAffine3, DMat3, DQuat, DVec3, Mat4, Vec2, Vec3};
+use farfield_integration_tests::pair::{draw, everything, hits, list, pair};
+use farfield_integration_tests::turned::turned;
+use glam::{DAffine3, DMat3, DQuat, DVec3, Mat4, Vec3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-/// The largest share of pixels that may differ on a driver other than lavapipe: silhouettes of small pictures.
-const MAX_SHARE: f64 = 0.02;
-
-/// Both backends on one scene, with all its chunks uploaded.
-struct Pair {
-    wgpu: WgpuBackend,
-    vulkan: VulkanBackend,
-    /// On lavapipe nothing may differ.
-    exact: bool,
-}
-
-/// Both backends, or a skip that says why.
-fn pair(test: &str, scene: &Scene) -> Option<Pair> {
-    let skip = |why: String| {
-        assert!(std::env::var_os("FARFIELD_EXPECT_DEVICE").is_none_or(|v| v != "1"), "{test}: {why}");
-        eprintln!("SKIPPED: {test}: {why}");
-    };
-    let vulkan =
-        VulkanBackend::new(scene, farfield_vulkan::Options::default()).map_err(|e| skip(e.to_string())).ok()?;
-    let device = vulkan.info().device.clone();
-    // wgpu is to take the very device that Vulkan took; its own name is the part before the driver's.
-    let adapter = device.split(',').next().map(str::to_owned);
-    let options = farfield_wgpu::Options { adapter, ..farfield_wgpu::Options::default() };
-    let wgpu = WgpuBackend::new(scene, &options).map_err(|e| skip(e.to_string())).ok()?;
-    let mut pair = Pair { wgpu, vulkan, exact: device.contains("llvmpipe") };
-    let bytes = upload_scene(&mut pair.wgpu, scene).unwrap();
-    assert_eq!(upload_scene(&mut pair.vulkan, scene).unwrap(), bytes);
-    Some(pair)
-}
-
-impl Pair {
-    fn upload(&mut self, id: PayloadRef, payload: &Payload) {
-        let data = BlockData::Payload(payload);
-        let bytes = self.wgpu.upload(Block::Payload(id), &data).unwrap();
-        assert_eq!(self.vulkan.upload(Block::Payload(id), &data).unwrap(), bytes);
-    }
-
-    /// Renders on both and compares counts, the surface of target 0 and the picture of target 1; returns what was seen.
-    fn check(&mut self, what: &str, list: &DrawList) -> (SurfaceImage, Picture) {
-        let (a, b) = (self.wgpu.render(list).unwrap(), self.vulkan.render(list).unwrap());
-        assert_eq!((a.near_triangles, a.far_triangles), (b.near_triangles, b.far_triangles), "{what}");
-        let surface = self.vulkan.read_surface(TargetId(0)).unwrap();
-        let other = self.wgpu.read_surface(TargetId(0)).unwrap();
-        self.same_surface(what, &other, &surface);
-        let picture = self.vulkan.read_picture(TargetId(1)).unwrap();
-        let other = self.wgpu.read_picture(TargetId(1)).unwrap();
-        assert_eq!(other.size, picture.size, "{what}");
-        self.same(what, "picture", &other.rgba, &picture.rgba, picture.size);
-        (surface, picture)
-    }
-
-    fn same_surface(&self, what: &str, a: &SurfaceImage, b: &SurfaceImage) {
-        assert_eq!(a.size, b.size, "{what}");
-        self.same(what, "albedo", &a.albedo, &b.albedo, b.size);
-        self.same(what, "normal", &a.normal, &b.normal, b.size);
-        let bits = |i: &SurfaceImage| i.depth.iter().map(|d| d.to_bits()).collect::<Vec<_>>();
-        self.same(what, "depth", &bits(a), &bits(b), b.size);
-        self.same(what, "object", &a.object, &b.object, b.size);
-    }
-
-    fn same<T: PartialEq + std::fmt::Debug>(&self, what: &str, plane: &str, a: &[T], b: &[T], size: [u32; 2]) {
-        assert_eq!(a.len(), b.len(), "{what}, {plane}");
-        let differ: Vec<usize> = (0..a.len()).filter(|&i| a[i] != b[i]).collect();
-        let allowed = if self.exact { 0.0 } else { MAX_SHARE * a.len() as f64 };
-        if !differ.is_empty() {
-            eprintln!("{what}, {plane}: {} of {} pixels differ", differ.len(), a.len());
-        }
-        assert!(
-            differ.len() as f64 <= allowed,
-            "{what}, {plane}: {} pixels of {size:?} differ, first at {}: {:?} {:?}",
-            differ.len(),
-            differ[0],
-            a[differ[0]],
-            b[differ[0]]
-        );
-    }
-}
-
-/// A shape of rings round an axis, 2 (rings - 1) segments triangles, whose radius `radius` gives at height 0..1.
-fn turned(rings: u32, segments: u32, colors: bool, material: u32, radius: impl Fn(f32, f32) -> f32) -> TriangleMesh {
-    let n = segments + 1;
-    let uv = |i: u32| Vec2::new((i % n) as f32 / segments as f32, (i / n) as f32 / (rings - 1) as f32);
-    let place = |i: u32| {
-        let angle = uv(i).x * std::f32::consts::TAU;
-        let r = radius(uv(i).y, angle);
-        Vec3::new(r * angle.cos(), uv(i).y * 2.0 - 1.0, -r * angle.sin())
-    };
-    let indices: Vec<u32> = (0..(rings - 1) * segments)
-        .flat_map(|q| {
-            let i = q / segments * n + q % segments;
-            [i, i + 1, i + n, i + n, i + 1, i + n + 1]
-        })
-        .collect();
-    TriangleMesh {
-        positions: (0..rings * n).map(place).collect(),
-        uvs: (0..rings * n).map(|i| uv(i) * 3.0 - 1.0).collect(),
-        colors: if colors {
-            (0..rings * n).map(|i| [(37 * i % 200 + 50) as u8, (91 * i % 200 + 50) as u8, 200, 255]).collect()
-        } else {
-            vec![]
-        },
-        sections: vec![(0..indices.len() as u32, MaterialId(material))],
-        indices,
-        ..TriangleMesh::default()
-    }
-}
 
 fn texture(name: &str, size: [u32; 2], rng: &mut ChaCha8Rng) -> Texture {
     let rgba = (0..size[0] * size[1]).map(|_| [rng.random(), rng.random(), rng.random(), 255]).collect();
@@ -166,36 +57,6 @@ fn vases(count: u32, at: DVec3, seed: u64) -> Scene {
     b.build().unwrap()
 }
 
-fn shading(scene: &Scene) -> Shading {
-    let light = |kind, color| Light { kind, color, moves: false };
-    let sun = LightKind::Directional { to_light: Vec3::new(0.4, 0.8, 0.3).normalize(), angle_rad: 0.0 };
-    let lamp = LightKind::Point { position: scene.bounds.centre() + Vec3::Y * 2.0, radius: 0.0 };
-    Shading {
-        ambient: Vec3::splat(0.15),
-        lights: vec![light(sun, Vec3::new(0.9, 0.8, 0.7)), light(lamp, Vec3::new(0.1, 0.2, 0.5))],
-        sky: [93, 141, 219],
-        ground: [71, 63, 52],
-    }
-}
-
-fn list(scene: &Scene, camera: Camera, draws: Vec<Draw>) -> DrawList {
-    let shade = PassKind::Shade { surface: TargetId(0), shading: shading(scene) };
-    DrawList {
-        passes: vec![
-            Pass { kind: PassKind::Surface, camera, writes: TargetId(0), draws },
-            Pass { kind: shade, camera, writes: TargetId(1), draws: vec![] },
-        ],
-    }
-}
-
-fn draw(what: DrawWhat) -> Draw {
-    Draw { what, bounds: Aabb::EMPTY, error_px: 0.0 }
-}
-
-fn everything(scene: &Scene, camera: Camera) -> DrawList {
-    list(scene, camera, vec![draw(DrawWhat::Chunks(scene.all_chunks()))])
-}
-
 /// Cameras around and within the scene, one of them off-axis.
 fn cameras(scene: &Scene, size: [u32; 2]) -> [Camera; 3] {
     let centre = scene.bounds.centre().as_dvec3();
@@ -203,10 +64,6 @@ fn cameras(scene: &Scene, size: [u32; 2]) -> [Camera; 3] {
     let mut off_axis = at(DVec3::new(-6.0, 1.0, 5.0), 0.9);
     (off_axis.left, off_axis.top) = (off_axis.left * 1.4, off_axis.top * 0.6);
     [at(DVec3::new(9.0, 3.0, 9.0), 1.0), at(DVec3::new(0.4, 0.6, 1.0), 1.4), off_axis]
-}
-
-fn hits(image: &SurfaceImage) -> usize {
-    image.object.iter().filter(|&&o| o != 0).count()
 }
 
 #[test]
@@ -381,56 +238,4 @@ fn blocks_that_come_and_go_leave_the_same() {
         scene.geometry.with(id, &mut both).unwrap();
     }
     assert_eq!(pair.check("after", &everything(&scene, camera)), before);
-}
-
-/// A scene of about `triangles` triangles, all in view of its camera: tiles of a bumpy sheet.
-fn sheets(triangles: u32) -> (Scene, Camera) {
-    let mut b = SceneBuilder::default();
-    b.materials.push(Material { two_sided: true, ..Material::default() });
-    let tiles = 10;
-    let side = ((triangles / (2 * tiles * tiles)) as f64).sqrt().round() as u32;
-    let mesh = turned(side + 1, side, true, 0, |y, a| 0.6 + 0.2 * (40.0 * y).sin() * (11.0 * a).cos());
-    // Each tile is a mesh of its own, so that as many triangles are resident as are drawn.
-    for i in 0..tiles * tiles {
-        let mesh = b.mesh(&format!("tile {i}"), mesh.clone()).unwrap();
-        let place = DVec3::new(f64::from(i % tiles) * 2.0, 0.0, f64::from(i / tiles) * -2.0);
-        b.place(Placement { mesh, transform: DAffine3::from_translation(place) });
-    }
-    let scene = b.build().unwrap();
-    let eye = scene.bounds.centre().as_dvec3() + DVec3::new(0.0, 14.0, 18.0);
-    let camera = Camera::looking(eye, Vec3::new(0.0, -14.0, -18.0), Vec3::Y, 1.0, [1024, 1024], 0.1);
-    (scene, camera)
-}
-
-#[test]
-#[ignore = "prints frame times of both backends; takes minutes, and gigabytes of memory"]
-fn frame_times_side_by_side() {
-    for triangles in [100_000, 1_000_000, 8_000_000] {
-        let (scene, camera) = sheets(triangles);
-        let Some(mut pair) = pair("frame_times_side_by_side", &scene) else { return };
-        let list = everything(&scene, camera);
-        let (surface, _) = pair.check("first frame", &list);
-        // The least and the median, milliseconds.
-        let of = |mut all: Vec<f64>| {
-            all.sort_by(f64::total_cmp);
-            format!("{:.1} / {:.1} ms", all[0], all[all.len() / 2])
-        };
-        // Taken in turns, so that whatever else the machine does meets both.
-        let (mut a, mut b): (Vec<Counted>, Vec<Counted>) = (vec![], vec![]);
-        for _ in 0..9 {
-            a.push(pair.wgpu.render(&list).unwrap());
-            b.push(pair.vulkan.render(&list).unwrap());
-        }
-        for (name, all) in [("wgpu", a), ("vulkan", b)] {
-            println!(
-                "{} triangles in {} chunks, {:.0} % of pixels hit, {name}: wall {}, gpu {} (least / median), {:?} clipped",
-                scene.triangles(),
-                scene.chunks.len(),
-                100.0 * hits(&surface) as f64 / surface.object.len() as f64,
-                of(all.iter().map(|c| c.wall_ms).collect()),
-                of(all.iter().map(|c| c.gpu_ms.unwrap_or(f64::NAN)).collect()),
-                all[0].clipped_primitives,
-            );
-        }
-    }
 }

@@ -14,19 +14,8 @@ use farfield_experiments::config;
 use farfield_experiments::run::{self, Options};
 use farfield_integration_tests::lab::told;
 use farfield_integration_tests::stones;
-use glam::DVec3;
 
-const EXPERIMENT: &str = r#"
-[scene]
-path = "stones.glb"
-[view]
-resolution = [256, 256]
-eye_height = [1.5, 1.5]
-near = 0.05
-path = "line"
-max_speed = 60.0
-frames_per_s = 10
-frames = 9
+const PIPELINES: &str = r#"
 [[pipeline]]
 name = "hybrid"
 partition = { type = "hex-cells", edge = 3.0 }
@@ -55,11 +44,9 @@ struct Folder(tempfile::TempDir);
 
 impl Folder {
     fn new() -> Self {
-        let dir = tempfile::tempdir().unwrap();
-        let places: Vec<DVec3> =
-            (0..9).map(|i| DVec3::new(f64::from(i / 2) * 12.0, 0.0, if i % 2 == 0 { -8.0 } else { 8.5 })).collect();
-        stones::write(&dir.path().join("stones.glb"), stones::stone(24, 32), &places);
-        std::fs::write(dir.path().join("experiment.toml"), EXPERIMENT).unwrap();
+        let dir = stones::folder();
+        let text = stones::experiment([256, 256], PIPELINES);
+        std::fs::write(dir.path().join("experiment.toml"), text).unwrap();
         Self(dir)
     }
 

@@ -11,6 +11,8 @@ mod test;
 
 use std::process::{Command, ExitCode};
 
+const USAGE: &str = "usage: cargo xtask demo | test [CARGO TEST ARGUMENTS] | lint | book [--check]";
+
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
@@ -23,7 +25,7 @@ fn main() -> ExitCode {
         Some("test") => test::run(&args[1..]),
         Some("lint") => lint(),
         Some("book") => book::run(args.iter().any(|a| a == "--check")),
-        _ => Err("usage: cargo xtask demo | test [CARGO TEST ARGUMENTS] | lint | book [--check]".into()),
+        _ => Err(USAGE.into()),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -37,7 +39,7 @@ fn main() -> ExitCode {
 /// Runs a command with this process's terminal; an exit code other than 0 is an error.
 fn run(program: &str, args: &[&str]) -> Result<(), String> {
     println!("$ {program} {}", args.join(" "));
-    match Command::new(program).args(args).status() {
+    match setup::without_display(Command::new(program).args(args)).status() {
         Ok(s) if s.success() => Ok(()),
         Ok(s) => Err(format!("{program} {} ended with {s}", args.join(" "))),
         Err(e) => Err(format!("{program}: {e}")),
@@ -61,4 +63,26 @@ fn lint() -> Result<(), String> {
         println!("cargo-deny is not installed: licences are checked by the tests alone");
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::USAGE;
+    use std::path::Path;
+
+    #[test]
+    fn every_task_that_is_quoted_exists() {
+        let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+        let pages = [root.to_owned(), root.join("book/src")].into_iter().flat_map(|d| d.read_dir().unwrap());
+        let mut quoted = 0;
+        for page in pages.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "md")) {
+            let text = std::fs::read_to_string(&page).unwrap();
+            for rest in text.split("cargo xtask ").skip(1) {
+                let task = rest.split(|c: char| !c.is_ascii_lowercase()).next().unwrap();
+                assert!(USAGE.split([' ', '|']).any(|w| w == task), "{}: cargo xtask {task}", page.display());
+                quoted += 1;
+            }
+        }
+        assert!(quoted > 4, "{quoted}");
+    }
 }

@@ -196,7 +196,8 @@ pub struct BudgetSettings {
     /// Most bytes of geometry and payloads resident on the device; without it all that is wanted.
     #[schemars(range(min = 1), extend("unit" = "bytes"))]
     pub memory_bytes: Option<u64>,
-    /// Most bytes of payloads uploaded a frame; without it all that the scheduler asks for.
+    /// Most bytes that a frame uploads of what the scheduler asks for, but always one block; the rest follows in later
+    /// frames. Without it all at once.
     #[schemars(range(min = 1), extend("unit" = "bytes"))]
     pub upload_bytes_per_frame: Option<u64>,
 }

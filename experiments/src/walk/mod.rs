@@ -76,6 +76,8 @@ pub struct Walked {
     pub samples: u64,
     /// Blocks not there.
     pub missing: u32,
+    /// Bytes that the scheduler had uploaded for it, by the far field's own account of its blocks.
+    pub uploaded_bytes: u64,
     /// Bytes resident.
     pub resident_bytes: u64,
     /// Bytes of resident texels.
@@ -105,8 +107,8 @@ impl<'a> Walker<'a> {
         }
     }
 
-    /// Loads what a frame needs: its near chunks, then what the scheduler plans.
-    fn load(&mut self, camera: &Camera, cell: Option<CellId>) -> Result<(), Fault> {
+    /// Loads what a frame needs: its near chunks, then what the scheduler plans; the bytes of the latter.
+    fn load(&mut self, camera: &Camera, cell: Option<CellId>) -> Result<u64, Fault> {
         let (scene, opened) = (self.tour.scene, &self.opened);
         let fetch = |b: Block| opened.fetch(b);
         self.residency.tick();
@@ -126,24 +128,27 @@ impl<'a> Walker<'a> {
         let asked = self.on_demand.as_ref().map(|_| RefCell::default());
         let wants = Wants { opened, residency: &self.residency, asked };
         let plan = self.planner.plan(&motion, &wants, self.residency.left_for_scheduler());
+        let sizes = wants.sizes(&plan.fetch, cell, camera);
         let asked = wants.asked.map(RefCell::into_inner).unwrap_or_default();
         plan.evict.into_iter().for_each(|b| self.residency.release(self.device, b));
-        // At least one block a frame, or one that is larger than the limit would never come.
-        let mut left = self.upload_bytes_per_frame;
+        let mut uploaded = 0;
         for block in plan.fetch {
-            if left == Some(0) {
+            let bytes = sizes.get(&block).copied().unwrap_or(0);
+            // At least one block a frame, or one that is larger than the limit would never come. What is left waits, in its
+            // order: a later, smaller block may be useless without it.
+            if uploaded > 0 && self.upload_bytes_per_frame.is_some_and(|most| uploaded + bytes > most) {
                 break;
             }
-            let before = self.residency.bytes;
             let texels = opened.stored(block).map_or(0, |s| s.texture_bytes);
-            self.residency.hold(self.device, block, true, texels, scene, &fetch)?;
-            left = left.map(|l| l.saturating_sub(self.residency.bytes.saturating_sub(before)));
+            if self.residency.hold(self.device, block, true, texels, scene, &fetch)? {
+                uploaded += bytes;
+            }
         }
         if let Some(builder) = &mut self.on_demand {
             builder.build(&mut self.opened, &asked)?;
         }
         (self.last, self.frames) = (Some(*camera), self.frames + 1);
-        Ok(())
+        Ok(uploaded)
     }
 
     /// The next frame of the path.
@@ -155,7 +160,7 @@ impl<'a> Walker<'a> {
             builder.enter(&mut self.opened, camera)?;
         }
         let cell = self.opened.cell_of(camera);
-        self.load(camera, cell)?;
+        let uploaded_bytes = self.load(camera, cell)?;
         let residency = &self.residency;
         let drawn = self.opened.draws(cell, camera, &|b| residency.has(b));
         let list = frame(camera, drawn.draws, self.tour.shading);
@@ -179,6 +184,7 @@ impl<'a> Walker<'a> {
             far_triangles: best.far_triangles,
             samples: best.samples,
             missing: drawn.missing,
+            uploaded_bytes,
             resident_bytes: self.residency.bytes,
             texture_bytes: self.residency.texture_bytes,
         })

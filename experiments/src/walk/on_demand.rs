@@ -59,6 +59,9 @@ impl<'a> OnDemand<'a> {
             if self.account_ms <= 0.0 {
                 break;
             }
+            if opened.built.cells.get(&id).is_some_and(|c| c.manifest.is_some()) {
+                continue;
+            }
             let start = Instant::now();
             let shared = opened.built.shared.as_ref().map(|s| (s.0, &s.1));
             let (id, cell, needs, new) = self.site.cell(opened.pipeline, opened.division, id, shared)?;

@@ -1,7 +1,7 @@
 //! A built pipeline, opened for drawing: its far views, and the draws of a frame.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use farfield_core::cell::{Active, Cell};
 use farfield_core::claim::Claim;
@@ -232,6 +232,21 @@ pub(super) struct Wants<'a> {
     pub(super) residency: &'a Residency,
     /// The cells that were asked for and are not built, first to last; `None` where nothing is built on demand.
     pub(super) asked: Option<RefCell<Vec<CellId>>>,
+}
+
+impl Wants<'_> {
+    /// What the far field says of the sizes of blocks, bytes, seen from a camera in a cell: of these blocks and of others in
+    /// the same cells.
+    pub(super) fn sizes(&self, blocks: &[Block], here: Option<CellId>, from: &Camera) -> BTreeMap<Block, u64> {
+        let own = |b: &Block| match b {
+            Block::Payload(p) if p.asset != SHARED => Some(CellId(p.asset.0 - 1)),
+            _ => here,
+        };
+        let cells: BTreeSet<CellId> = blocks.iter().filter_map(own).collect();
+        let mut all = vec![];
+        cells.into_iter().for_each(|c| self.of(c, from, &mut all));
+        all.into_iter().map(|c| (c.block, c.bytes)).collect()
+    }
 }
 
 impl Demand for Wants<'_> {

@@ -21,16 +21,15 @@ fn vertex(
     @location(2) uv: vec2<f32>,
     @location(3) color: vec4<f32>,
 ) -> Varyings {
-    let seen = from_eye(record, position);
-    let clip = view.projection * vec4<f32>(seen, 1.0);
+    let at = placed(record, position);
     return Varyings(
-        clip,
+        at.clip,
         records[record].base_color.rgb * linear_of_srgb(color.rgb),
         local_normal(record, from_octahedral(normal)),
-        seen,
+        at.seen,
         uv,
-        clip.w,
-        vec2<u32>(records[record].object, records[record].two_sided),
+        at.clip.w,
+        at.tags,
     );
 }
 

@@ -16,15 +16,14 @@ fn vertex(
     @location(1) normal: u32,
     @location(2) color: vec4<f32>,
 ) -> Varyings {
-    let seen = from_eye(record, position);
-    let clip = view.projection * vec4<f32>(seen, 1.0);
+    let at = placed(record, position);
     return Varyings(
-        clip,
+        at.clip,
         linear_of_srgb(color.rgb),
         from_octahedral(normal),
-        seen,
-        clip.w,
-        vec2<u32>(records[record].object, records[record].two_sided),
+        at.seen,
+        at.clip.w,
+        at.tags,
     );
 }
 

@@ -54,16 +54,15 @@ fn vertex(
     @location(2) color: vec4<f32>,
     @location(3) views: u32,
 ) -> Varyings {
-    let seen = from_eye(record, position);
-    let clip = view.projection * vec4<f32>(seen, 1.0);
+    let at = placed(record, position);
     return Varyings(
-        clip,
+        at.clip,
         linear_of_srgb(color.rgb),
         from_octahedral(normal),
-        seen,
+        at.seen,
         position,
-        clip.w,
-        vec2<u32>(records[record].object, records[record].two_sided),
+        at.clip.w,
+        at.tags,
         vec2<u32>(views, records[record].first_projector),
     );
 }

@@ -1,4 +1,4 @@
-// What the three surface shaders share: a pass's camera, the draw records, the planes that they fill.
+// What the three surface shaders share: a pass's camera, the draw records, the vertex's place, the planes that they fill.
 
 struct View {
     // From positions relative to the eye to clip space; w is linear depth.
@@ -35,9 +35,22 @@ struct Planes {
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> records: array<Record>;
 
-fn from_eye(record: u32, position: vec3<f32>) -> vec3<f32> {
+// A vertex in its place.
+struct Placed {
+    // Relative to the eye.
+    seen: vec3<f32>,
+    clip: vec4<f32>,
+    // Object number + 1, and whether the surface has two sides.
+    tags: vec2<u32>,
+}
+
+// What every vertex stage begins with, from a stored position.
+fn placed(record: u32, position: vec3<f32>) -> Placed {
     let p = vec4<f32>(position, 1.0);
-    return vec3<f32>(dot(records[record].to_eye_x, p), dot(records[record].to_eye_y, p), dot(records[record].to_eye_z, p));
+    let seen =
+        vec3<f32>(dot(records[record].to_eye_x, p), dot(records[record].to_eye_y, p), dot(records[record].to_eye_z, p));
+    let clip = view.projection * vec4<f32>(seen, 1.0);
+    return Placed(seen, clip, vec2<u32>(records[record].object, records[record].two_sided));
 }
 
 fn local_normal(record: u32, normal: vec3<f32>) -> vec3<f32> {
