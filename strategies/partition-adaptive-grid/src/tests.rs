@@ -348,7 +348,7 @@ fn a_budget_under_what_meets_at_a_place_is_refused_with_the_least() {
     assert!(!fine.contains("larger leaf_depth"), "{fine}");
     // The place that is named holds that much, and no sampled place holds more.
     let holding = |p: Vec3| -> u64 {
-        s.chunks.iter().filter(|c| c.bounds.distance(p) < 1e-3).map(|c| u64::from(c.triangles)).sum()
+        s.chunks.iter().filter(|c| c.bounds.distance(p) < 2e-3).map(|c| u64::from(c.triangles)).sum()
     };
     let named = fine.split("at (").nth(1).unwrap().split(')').next().unwrap();
     let at: Vec<f32> = named.split(", ").map(|n| n.parse().unwrap()).collect();
