@@ -81,7 +81,7 @@ pub fn write(file: &Path, mesh: TriangleMesh, places: &[DVec3]) {
 /// When it cannot be written.
 pub fn folder() -> tempfile::TempDir {
     let dir = tempfile::tempdir().expect("a temporary folder");
-    let place = |i: u32| DVec3::new(f64::from(i / 2) * 12.0, 0.0, if i % 2 == 0 { -8.0 } else { 8.5 });
+    let place = |i: u32| DVec3::new(f64::from(i / 2) * 12.0, 0.0, if i.is_multiple_of(2) { -8.0 } else { 8.5 });
     write(&dir.path().join("stones.glb"), stone(24, 32), &(0..9).map(place).collect::<Vec<_>>());
     dir
 }
