@@ -7,9 +7,10 @@
 use farfield_core::registry::{Entry, Kind, settings_of};
 
 pub use {
-    farfield_far_baselines as far_baselines, farfield_far_ldi as far_ldi, farfield_far_textured_mesh as far_textured_mesh,
-    farfield_metrics as metrics, farfield_partition_hex as partition_hex,
-    farfield_partition_single_cell as partition_single_cell, farfield_schedulers as schedulers,
+    farfield_far_baselines as far_baselines, farfield_far_ldi as far_ldi,
+    farfield_far_textured_mesh as far_textured_mesh, farfield_metrics as metrics,
+    farfield_partition_hex as partition_hex, farfield_partition_single_cell as partition_single_cell,
+    farfield_schedulers as schedulers,
 };
 
 /// The paper of the textured LOD meshes, before a section's number.
@@ -22,7 +23,10 @@ macro_rules! textured {
 /// The paper of image placement, before a section's number.
 macro_rules! placement {
     ($section:literal) => {
-        concat!("Automatic image placement to provide a guaranteed frame rate (Aliaga, Lastra 1999), section ", $section)
+        concat!(
+            "Automatic image placement to provide a guaranteed frame rate (Aliaga, Lastra 1999), section ",
+            $section
+        )
     };
 }
 

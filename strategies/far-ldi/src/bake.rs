@@ -83,7 +83,9 @@ fn part(
     let mut numbers: BTreeMap<u32, u16> = all().map(|s| (s.object, 0)).collect();
     for (i, n) in numbers.values_mut().enumerate() {
         *n = u16::try_from(i).map_err(|_| {
-            Fault::Refused("layered-depth-image: more than 65,536 objects in one image; divide the window's far part".into())
+            Fault::Refused(
+                "layered-depth-image: more than 65,536 objects in one image; divide the window's far part".into(),
+            )
         })?;
     }
     let mut bounds = Aabb::EMPTY;

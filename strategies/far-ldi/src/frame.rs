@@ -63,8 +63,7 @@ pub(crate) fn frame(
     }
     let border = cell.outline.region.support(camera.forward) - centre.dot(camera.forward);
     let from = 0.5 * if border > 0.0 { distance.min(border) } else { distance };
-    let boxes: Vec<Vec3> =
-        seen.iter().flat_map(|c| ahead(&scene.chunks[c.index()].bounds, from, &place)).collect();
+    let boxes: Vec<Vec3> = seen.iter().flat_map(|c| ahead(&scene.chunks[c.index()].bounds, from, &place)).collect();
     let (mut lo, mut hi) = tangents(&corners);
     let (least, most) = tangents(&boxes);
     (lo, hi) = (lo.max(least), hi.min(most));
@@ -136,12 +135,8 @@ mod tests {
         };
         let far: ChunkSet = [ChunkId(0)].into_iter().collect();
         let sector = Sector { split: SplitId(0), window, seen: far.clone() };
-        let outline = Outline {
-            id: CellId(0),
-            region: Region::Sphere { centre, radius: 1.0 },
-            centre,
-            neighbours: vec![],
-        };
+        let outline =
+            Outline { id: CellId(0), region: Region::Sphere { centre, radius: 1.0 }, centre, neighbours: vec![] };
         let splits = vec![Split { far: far.clone(), near_budget: None }];
         let cell = Cell { outline, splits, sectors: vec![sector.clone()], own: vec![], claims: vec![] };
         frame(&cell, &sector, &far, &scene, 0.1, Grain { density: 2.0, max_px }).unwrap()

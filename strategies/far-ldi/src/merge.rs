@@ -6,16 +6,17 @@
 //!
 //! * A sample stands on its pixel's central ray. An element is given to every ray that meets its parallelogram, at the depth where it
 //!   meets it: coarser pictures leave no gaps, finer ones no doubles, and outlines stay where they are to half a pixel.
-//! * An element that the layered image sees too much at a slant ([`GRAZING`]) meets no ray worth the name: it is given to the
-//!   pixel that it falls into, at its own depth moved along its plane, which is taken as if it were seen at that slant.
-//!   Several such samples of a pixel, one behind the other, make up a wall that is seen edge-on.
+//! * On a surface that the layered image sees at a slant ([`SLANT`]) one sample a ray is far from the next, farther than a drawn sample
+//!   reaches once the eye comes near. Its elements are also given, as points at their own depth, to the pixel that they fall
+//!   into: several samples of a pixel, one behind the other, make up a wall that is seen edge-on. That such a point moves to its
+//!   pixel's ray takes it off its plane by half a pixel times the cosine of the slant at most.
 //! * The central picture has the layered image's own rays and is merged first: what it sees is exactly the front of every
-//!   pixel. Nothing may stand before it: an element that would, a rounding apart, is given to the nearest of the pixels around that
-//!   allow it, or dropped. (The paper merges the images nearest to the window first.)
-//! * Elements that their own picture sees at a slant wait until all others are in.
-//! * The same surface: with footprint f = depth / pixels a unit tangent and slope s = tan of the angle between normal and ray (as
-//!   for [`GRAZING`] at most), two samples no farther apart in depth than merge_px f (1 + s / 2), whose normals are less
-//!   than 73 degrees apart; or no farther apart than f, whatever their normals.
+//!   pixel. Nothing may stand before it: a point that would is given to the nearest of the pixels around that allow it, or
+//!   dropped. (The paper merges the images nearest to the window first.)
+//! * Elements that their own picture sees at a grazing angle wait until all others are in, as points.
+//! * The same surface: with footprint f = depth / pixels a unit tangent and slope s = tan of the angle between normal and ray (that of
+//!   [`GRAZING`] at most), two samples no farther apart in depth than merge_px f (1 + s / 2), whose normals are less
+//!   than 73 degrees apart; or no farther apart than f, whatever their normals. A point: no farther than merge_px f.
 
 use farfield_core::Camera;
 use farfield_core::image::{SurfaceImage, from_octahedral};
@@ -24,6 +25,8 @@ use glam::{DVec3, Vec2, Vec3};
 
 /// Ends a list.
 const NONE: u32 = u32::MAX;
+/// The cosine between normal and ray under which a surface takes points beside its rays' samples.
+const SLANT: f32 = 0.4;
 /// A ray may miss an element by this share of the element's pixel: planes of neighbouring elements do not quite join.
 const SLACK: f32 = 0.1;
 /// The least cosine between normals of one surface.
@@ -93,14 +96,15 @@ impl Layers {
                 let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5);
                 let s = sample(picture, i);
                 let element = Element { at: offset + ray * s.depth, sample: s };
-                let wait = s.normal.dot(ray).abs() < GRAZING * ray.length();
-                if slanted(&element) {
-                    if wait { self.waiting.push(element) } else { self.put_slanted(&element) }
+                if s.normal.dot(ray).abs() < GRAZING * ray.length() {
+                    self.waiting.push(element);
                     continue;
                 }
-                if wait {
-                    // Rays that meet it are looked for once its own picture is gone: the point itself has to do.
-                    self.waiting.push(element);
+                let facing = s.normal.dot(element.at).abs() / element.at.length();
+                if facing < SLANT {
+                    self.put_point(&element);
+                }
+                if facing < GRAZING {
                     continue;
                 }
                 let Some(splat) = warp.splat(x, y, s.depth, s.normal) else { continue };
@@ -111,9 +115,9 @@ impl Layers {
                         let own = self.ray(u, v);
                         let depth = s.normal.dot(element.at) / s.normal.dot(own);
                         let meets = depth > 0.0
-                            && camera.project(own * depth - offset).is_some_and(|p| {
-                                (p.truncate() - middle).abs().max_element() <= 0.5 + SLACK
-                            });
+                            && camera
+                                .project(own * depth - offset)
+                                .is_some_and(|p| (p.truncate() - middle).abs().max_element() <= 0.5 + SLACK);
                         if meets {
                             self.put(u, v, Sample { depth, ..s });
                         }
@@ -131,7 +135,7 @@ impl Layers {
         (y * self.camera.size[0] + x) as usize
     }
 
-    /// What counts as one place in depth, for a sample on a ray.
+    /// A footprint at a sample, and how far along its ray the same surface reaches.
     fn tolerance(&self, s: &Sample, ray: Vec3) -> [f32; 2] {
         let footprint = s.depth / self.camera.px_per_tan();
         let c = (s.normal.dot(ray).abs() / ray.length()).clamp(GRAZING, 1.0);
@@ -139,80 +143,69 @@ impl Layers {
         [footprint, self.merge_px * footprint * (1.0 + 0.5 * slope)]
     }
 
-    /// Whether a sample would stand before what the centre sees on its ray.
-    fn before_the_front(&self, i: usize, depth: f32, tolerance: f32) -> bool {
-        depth < self.front[i] - tolerance
-    }
-
-    /// Keeps a sample unless its surface is there or the centre sees past it.
+    /// Keeps a sample on its ray unless its surface is there or the centre sees past it.
     fn put(&mut self, x: u32, y: u32, s: Sample) {
         let (i, ray) = (self.index(x, y), self.ray(x, y));
         let [footprint, along] = self.tolerance(&s, ray);
-        let mut at = self.heads[i];
-        while at != NONE {
-            let (there, next) = &self.nodes[at as usize];
+        let there = |there: &Sample| {
             let apart = (there.depth - s.depth).abs();
             let same = s.normal.dot(there.normal) > SAME;
-            if apart <= footprint || (same && apart <= along.max(self.tolerance(there, ray)[1])) {
-                return;
-            }
-            at = *next;
+            apart <= footprint || (same && apart <= along.max(self.tolerance(there, ray)[1]))
+        };
+        if s.depth >= self.front[i] && !self.any(i, there) {
+            self.push(i, s);
         }
-        if self.before_the_front(i, s.depth, 0.0) {
-            return;
-        }
-        self.nodes.push((s, self.heads[i]));
-        self.heads[i] = self.nodes.len() as u32 - 1;
     }
 
-    /// A single sample for an element that rays meet at too much of a slant.
-    fn put_slanted(&mut self, e: &Element) {
+    /// Keeps a point in the pixel that it falls into, or in the nearest one around where nothing that the centre sees lies behind it.
+    fn put_point(&mut self, e: &Element) {
         let Some(p) = self.camera.project(e.at) else { return };
         let [w, h] = self.camera.size;
         if !(p.x >= 0.0 && p.y >= 0.0 && p.x < w as f32 && p.y < h as f32) {
             return;
         }
         let (x, y) = ((p.x as u32).min(w - 1), (p.y as u32).min(h - 1));
-        let n = e.sample.normal;
-        let moved = |x: u32, y: u32| {
-            let ray = self.ray(x, y);
-            let least = GRAZING * ray.length();
-            let facing = n.dot(ray);
-            let facing = if facing.abs() < least { least.copysign(facing) } else { facing };
-            p.z + n.dot(e.at - ray * p.z) / facing
-        };
-        let depth = moved(x, y);
-        let [footprint, _] = self.tolerance(&e.sample, self.ray(x, y));
-        if !self.before_the_front(self.index(x, y), depth, footprint) {
-            let front = self.front[self.index(x, y)];
-            self.put(x, y, Sample { depth: if front.is_finite() { depth.max(front) } else { depth }, ..e.sample });
-            return;
-        }
-        let mut best: Option<(f32, u32, u32)> = None;
+        let mut best: Option<(f32, usize)> = None;
         for v in y.saturating_sub(1)..(y + 2).min(h) {
             for u in x.saturating_sub(1)..(x + 2).min(w) {
                 let away = (Vec2::new(u as f32 + 0.5, v as f32 + 0.5) - p.truncate()).length_squared();
-                if !self.before_the_front(self.index(u, v), p.z, footprint) && best.is_none_or(|b| away < b.0) {
-                    best = Some((away, u, v));
+                let i = self.index(u, v);
+                if p.z >= self.front[i] && best.is_none_or(|b| away < b.0) {
+                    best = Some((away, i));
                 }
             }
         }
-        if let Some((_, u, v)) = best {
-            let depth = p.z.max(self.front[self.index(u, v)]);
-            self.put(u, v, Sample { depth, ..e.sample });
+        let apart = self.merge_px * p.z / self.camera.px_per_tan();
+        if let Some((_, i)) = best.filter(|&(_, i)| !self.any(i, |there| (there.depth - p.z).abs() <= apart)) {
+            self.push(i, Sample { depth: p.z, ..e.sample });
         }
+    }
+
+    fn any(&self, pixel: usize, mut test: impl FnMut(&Sample) -> bool) -> bool {
+        let mut at = self.heads[pixel];
+        while let Some((there, next)) = self.nodes.get(at as usize) {
+            if test(there) {
+                return true;
+            }
+            at = *next;
+        }
+        false
+    }
+
+    fn push(&mut self, pixel: usize, s: Sample) {
+        self.nodes.push((s, self.heads[pixel]));
+        self.heads[pixel] = self.nodes.len() as u32 - 1;
     }
 
     /// The samples of each pixel from front to back, by rows from the top.
     pub(crate) fn finish(mut self) -> Vec<Vec<Sample>> {
         for e in std::mem::take(&mut self.waiting) {
-            self.put_slanted(&e);
+            self.put_point(&e);
         }
         let pixel = |&head: &u32| {
             let mut out = vec![];
             let mut at = head;
-            while at != NONE {
-                let (s, next) = self.nodes[at as usize];
+            while let Some(&(s, next)) = self.nodes.get(at as usize) {
                 out.push(s);
                 at = next;
             }
@@ -224,11 +217,6 @@ impl Layers {
         };
         self.heads.iter().map(pixel).collect()
     }
-}
-
-/// Whether the layered image sees an element at too much of a slant for its rays to meet it well.
-fn slanted(e: &Element) -> bool {
-    e.sample.normal.dot(e.at).abs() < GRAZING * e.at.length()
 }
 
 fn sample(picture: &SurfaceImage, i: usize) -> Sample {

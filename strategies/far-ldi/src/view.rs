@@ -27,10 +27,10 @@ fn in_view(p: &Picture, view: &View<'_>) -> bool {
     p.split == view.at.split.0 && meets(view.camera, &p.corners)
 }
 
-/// False only where a convex body lies wholly outside one side plane of the camera.
+/// False only where a convex body lies wholly behind the eye or outside one side plane of the camera.
 fn meets(camera: &Camera, corners: &[Vec3; 8]) -> bool {
     let seen = corners.map(|c| (c.as_dvec3() - camera.eye).as_vec3());
-    camera.side_planes().iter().all(|n| seen.iter().any(|c| n.dot(*c) >= 0.0))
+    camera.side_planes().iter().chain([&camera.forward]).all(|n| seen.iter().any(|c| n.dot(*c) >= 0.0))
 }
 
 impl FarView for Warped {

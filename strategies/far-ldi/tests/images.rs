@@ -29,7 +29,7 @@ fn only(kept: &Kept) -> &LayeredPart {
 
 #[test]
 fn from_the_centre_the_picture_is_the_capture() {
-    let (scene, v) = (pipes(300, 1), views([400, 400]));
+    let (scene, v) = (pipes(1500, 1), views([400, 400]));
     let cell = ball(&scene, RADIUS, WINDOW, v.px_per_tan());
     let kept = bake(&scene, &v, &cell, "", 1);
     let part = only(&kept);
@@ -72,7 +72,7 @@ fn walked(scene: &Scene, cell: &Cell, kept: &Kept, cameras: &[Camera], order: Sp
 
 #[test]
 fn nine_images_leave_few_holes_where_one_leaves_many_and_keep_each_surface_once() {
-    let (scene, v) = (pipes(400, 7), views([320, 320]));
+    let (scene, v) = (pipes(2500, 7), views([320, 320]));
     let cell = ball(&scene, RADIUS, WINDOW, v.px_per_tan());
     let cameras = tour(&cell, &v, 12, 3);
     let mut before = f64::INFINITY;
@@ -141,14 +141,20 @@ fn round(cell: &Cell, v: &farfield_core::camera::ViewModel, seed: u64) -> Vec<Ca
 
 #[test]
 fn cells_with_windows_all_round_show_everything_around() {
-    let scene = pipes(400, 5);
+    let scene = pipes(2500, 5);
     let c = origin(&scene);
     let v = farfield_core::camera::ViewModel { eye_height: [c.y - 0.5, c.y + 0.5], ..views([240, 240]) };
     let hex = inside(&scene, &v, &HexCells { edge: 5.0, margin: None }, c);
     for (name, cell) in [("single-cell", boxed(&scene, &v)), ("hex-cells", hex)] {
         let kept = bake(&scene, &v, &cell, "max_px = 2048", 2);
         let index = kept.index();
-        assert!(kept.payloads.len() >= 4 && index.pictures.iter().all(|p| kept.payloads[&farfield_core::id::LocalPayload(p.payload)].samples() == p.samples));
+        assert!(
+            kept.payloads.len() >= 4
+                && index
+                    .pictures
+                    .iter()
+                    .all(|p| kept.payloads[&farfield_core::id::LocalPayload(p.payload)].samples() == p.samples)
+        );
         let cameras = round(&cell, &v, 9);
         let apart = walked(&scene, &cell, &kept, &cameras, SplatOrder::Nearest);
         println!(
@@ -192,7 +198,11 @@ fn a_view_draws_what_is_there_of_its_own_split_and_counts_the_rest() {
     // A second split: of the far chunks those to the left.
     let left = |c: &ChunkId| scene.chunks[c.index()].bounds.max.x < cell.outline.centre.x;
     let far: ChunkSet = cell.splits[0].far.iter().filter(left).collect();
-    cell.sectors.push(farfield_core::cell::Sector { split: SplitId(1), seen: cell.splits[0].far.clone(), ..cell.sectors[0].clone() });
+    cell.sectors.push(farfield_core::cell::Sector {
+        split: SplitId(1),
+        seen: cell.splits[0].far.clone(),
+        ..cell.sectors[0].clone()
+    });
     cell.splits.push(Split { far: far.clone(), near_budget: None });
     let kept = bake(&scene, &v, &cell, "", 2);
     let index = kept.index();
@@ -208,7 +218,14 @@ fn a_view_draws_what_is_there_of_its_own_split_and_counts_the_rest() {
         [(0, ahead, true, 1, 0), (1, ahead, true, 1, 0), (1, ahead, false, 0, 1), (0, back, true, 0, 0)]
     {
         let at = Active { cell: CellId(0), split: SplitId(split), sectors: vec![SectorId(split)] };
-        let view = View { scene: &scene, camera: &camera, at: &at, tolerance: &|_| 0.0, budget: Default::default(), cell: None };
+        let view = View {
+            scene: &scene,
+            camera: &camera,
+            at: &at,
+            tolerance: &|_| 0.0,
+            budget: Default::default(),
+            cell: None,
+        };
         let (mut draws, mut wanted) = (vec![], vec![]);
         let achieved = open.draw(&|_| there, &view, &mut draws);
         assert_eq!((draws.len(), achieved.missing), (drawn, missing));
@@ -231,8 +248,12 @@ fn what_cannot_be_served_is_refused_and_what_needs_nothing_says_so() {
     let mut blind = cell.clone();
     blind.sectors.clear();
     assert!(refused(&blind, "").contains("no window"));
-    for (settings, name) in [("construction_images = 10", "construction_images"), ("density = 0.0", "density"),
-        ("merge_px = -1.0", "merge_px"), ("max_px = 1", "max_px")] {
+    for (settings, name) in [
+        ("construction_images = 10", "construction_images"),
+        ("density = 0.0", "density"),
+        ("merge_px = -1.0", "merge_px"),
+        ("max_px = 1", "max_px"),
+    ] {
         assert!(refused(&cell, settings).contains(name));
     }
     blind.splits = vec![Split::default()];

@@ -1,33 +1,42 @@
 mod common;
 use common::*;
-use farfield_cpu::SplatOrder;
 use farfield_core::image::SurfaceImage;
+use farfield_cpu::SplatOrder;
 
 fn png(name: &str, i: &SurfaceImage, mark: Option<&SurfaceImage>) {
     let mut out = image::RgbImage::new(i.size[0], i.size[1]);
     for (k, p) in out.pixels_mut().enumerate() {
         let n = farfield_core::image::from_octahedral(i.normal[k]);
         let l = 0.4 + 0.6 * n.dot(glam::Vec3::new(0.4, 0.7, 0.6).normalize()).max(0.0);
-        *p = if i.hit(k) { image::Rgb([0, 1, 2].map(|c| (f32::from(i.albedo[k][c]) * l) as u8)) } else { image::Rgb([20, 30, 60]) };
-        if mark.is_some_and(|m| m.hit(k) && !i.hit(k)) { *p = image::Rgb([255, 0, 255]); }
+        *p = if i.hit(k) {
+            image::Rgb([0, 1, 2].map(|c| (f32::from(i.albedo[k][c]) * l) as u8))
+        } else {
+            image::Rgb([20, 30, 60])
+        };
+        if mark.is_some_and(|m| m.hit(k) && !i.hit(k)) {
+            *p = image::Rgb([255, 0, 255]);
+        }
     }
     out.save(format!("/tmp/ldi-{name}.png")).unwrap();
 }
 
 #[test]
 fn look() {
-    let scene = pipes(400, 7);
+    let scene = pipes(2500, 7);
     let v = views([512, 512]);
     let cell = ball(&scene, 6.0, 8.0, v.px_per_tan());
     println!("far {} of {}", cell.splits[0].far.len(), scene.chunks.len());
     let cams = tour(&cell, &v, 12, 3);
     let refs = direct(&scene, &cell.splits[0].far, &cams);
-    for set in ["construction_images = 1", "construction_images = 5", "", "merge_px = 0.5", "density = 2.0"] {
+    for set in ["construction_images = 1",  "", "density = 2.0"] {
         let t = std::time::Instant::now();
         let kept = bake(&scene, &v, &cell, set, 2);
         let took = t.elapsed();
         let p = &kept.index().pictures[0];
-        println!("{set}: {took:?} {:?} samples {} covered {} deepest {} round {}", p.size, p.samples, p.covered, p.deepest, p.rounding_px);
+        println!(
+            "{set}: {took:?} {:?} samples {} covered {} deepest {} round {}",
+            p.size, p.samples, p.covered, p.deepest, p.rounding_px
+        );
         for order in [SplatOrder::OcclusionCompatible, SplatOrder::Nearest] {
             let mut b = loaded(&scene, &kept, order);
             let mut a = Apart::default();
@@ -36,10 +45,18 @@ fn look() {
                 let w = warped(&mut b, &scene, &kept, 0, c);
                 let before = a.holes;
                 a.add(r, &w);
-                if a.holes - before > worst.0 { worst = (a.holes - before, k); }
+                if a.holes - before > worst.0 {
+                    worst = (a.holes - before, k);
+                }
             }
             let both = a.pixels;
-            println!("  {order:?} holes {:.4}% extra {:.4}% other {:.3}% albedo {:.3} worst {worst:?}", 100.0*a.share(a.holes), 100.0*a.share(a.extra), 100.0*a.share(a.other), a.albedo / both as f64);
+            println!(
+                "  {order:?} holes {:.4}% inner {:.4}% extra {:.4}% other {:.3}% albedo {:.3} worst {worst:?}",
+                100.0 * a.share(a.holes), 100.0 * a.share(a.inner),
+                100.0 * a.share(a.extra),
+                100.0 * a.share(a.other),
+                a.albedo / both as f64
+            );
             let k = worst.1;
             let w = warped(&mut b, &scene, &kept, 0, &cams[k]);
             let name = set.replace([' ', '=', '.'], "");
@@ -51,32 +68,16 @@ fn look() {
         let mut a = Apart::default();
         a.add(&direct(&scene, &cell.splits[0].far, &[centre])[0], &warped(&mut b, &scene, &kept, 0, &centre));
         println!("  centre {a:?}");
-        let Some(farfield_core::payload::Part::Layered(l)) = kept.payloads.values().next().map(|p| p.parts[0].clone()) else { panic!() };
+        let Some(farfield_core::payload::Part::Layered(l)) = kept.payloads.values().next().map(|p| p.parts[0].clone())
+        else {
+            panic!()
+        };
         let raw = postcard::to_allocvec(&l).unwrap();
         let z = zstd::bulk::compress(&raw, 3).unwrap();
-        {
-            let n = l.samples() as f64;
-            let size = |b: &[u8]| zstd::bulk::compress(b, 3).unwrap().len() as f64 / n;
-            let planes = |v: &[u16]| -> Vec<u8> { v.iter().map(|x| *x as u8).chain(v.iter().map(|x| (x >> 8) as u8)).collect() };
-            let delta = |v: &[u16]| -> Vec<u16> { let mut p = 0u16; v.iter().map(|&x| { let d = x.wrapping_sub(p); p = x; d }).collect() };
-            let zig = |v: &[u16]| -> Vec<u16> { v.iter().map(|&d| (d << 1) ^ ((d as i16 >> 15) as u16)).collect() };
-            // Order by layers.
-            let first = l.first_samples();
-            let mut order: Vec<usize> = vec![];
-            for k in 0..255u32 { for w in first.windows(2) { if w[0] + k < w[1] { order.push((w[0] + k) as usize); } } }
-            let by = |v: &[u16]| -> Vec<u16> { order.iter().map(|&i| v[i]).collect() };
-            let plane8 = |f: &dyn Fn(usize) -> u8, d: bool, o: bool| -> Vec<u8> { let mut p = 0u8; (0..l.samples()).map(|i| { let x = f(if o { order[i] } else { i }); if d { let r = x.wrapping_sub(p); p = x; r } else { x } }).collect() };
-            println!("  depth varint {:.3} planes {:.3} delta planes {:.3} zig {:.3} layer planes {:.3} layer delta {:.3} layer zig {:.3}",
-                size(&postcard::to_allocvec(&l.depth).unwrap()), size(&planes(&l.depth)), size(&planes(&delta(&l.depth))), size(&planes(&zig(&delta(&l.depth)))),
-                size(&planes(&by(&l.depth))), size(&planes(&delta(&by(&l.depth)))), size(&planes(&zig(&delta(&by(&l.depth))))));
-            println!("  object varint {:.3} planes {:.3} layer planes {:.3} layer delta {:.3}", size(&postcard::to_allocvec(&l.object).unwrap()), size(&planes(&l.object)), size(&planes(&by(&l.object))), size(&planes(&delta(&by(&l.object)))));
-            for (d, o) in [(false, false), (true, false), (false, true), (true, true)] {
-                let mut a = vec![]; for c in 0..3 { a.extend(plane8(&|i| l.albedo[i][c], d, o)); }
-                let mut m = vec![]; for c in 0..2 { m.extend(plane8(&|i| l.normal[i][c] as u8, d, o)); }
-                println!("  delta {d} layers {o}: albedo {:.3} normal {:.3}", size(&a), size(&m));
-            }
-            println!("  albedo as is {:.3} normal as is {:.3} counts {:.3}", size(l.albedo.as_flattened()), size(&postcard::to_allocvec(&l.normal).unwrap()), size(&l.counts));
-        }
-        println!("  bytes/sample raw {:.3} zstd {:.3}", raw.len() as f64 / l.samples() as f64, z.len() as f64 / l.samples() as f64);
+        println!(
+            "  bytes/sample raw {:.3} zstd {:.3}",
+            raw.len() as f64 / l.samples() as f64,
+            z.len() as f64 / l.samples() as f64
+        );
     }
 }

@@ -45,7 +45,11 @@ fn each_split_draws_its_own_and_what_they_share_is_baked_once() {
     let windows = cell.sectors.clone();
     let through = |k: usize| {
         let far = &far;
-        windows.iter().map(move |w| Sector { split: SplitId(k as u32), seen: w.seen.intersection(&far[k]), ..w.clone() })
+        windows.iter().map(move |w| Sector {
+            split: SplitId(k as u32),
+            seen: w.seen.intersection(&far[k]),
+            ..w.clone()
+        })
     };
     cell.sectors = through(0).chain(through(1)).collect();
     cell.splits = far.iter().map(|f| Split { far: f.clone(), near_budget: None }).collect();
@@ -73,7 +77,11 @@ fn each_split_draws_its_own_and_what_they_share_is_baked_once() {
         });
         assert_eq!(drawn.collect::<BTreeSet<u32>>(), BTreeSet::from(expected), "split {split}");
         assert_eq!(wanted.iter().map(|c| c.block).collect::<BTreeSet<Block>>().len(), wanted.len(), "a block twice");
-        assert_eq!(wanted.len(), kept.payloads.len(), "payloads of the other split are wanted too, for when it becomes active");
+        assert_eq!(
+            wanted.len(),
+            kept.payloads.len(),
+            "payloads of the other split are wanted too, for when it becomes active"
+        );
         let seen = wanted.iter().filter(|c| c.in_view && c.after.is_some()).count();
         assert_eq!(seen, 2);
     }

@@ -194,8 +194,7 @@ mod tests {
             let eye = Camera::looking(DVec3::new(x, 0.0, 0.0), Vec3::X, Vec3::Y, 1.0, [8, 8], 0.1);
             let moved = (x - at).abs() as f32;
             at = x;
-            let motion =
-                Motion { time_s: i as f64, moved, turned_rad: 0.0, eye: &eye, lights: &[], future: None };
+            let motion = Motion { time_s: i as f64, moved, turned_rad: 0.0, eye: &eye, lights: &[], future: None };
             let plan = planner.plan(&motion, &world, budget);
             assert!(plan.evict.iter().all(|b| world.resident.remove(b)));
             assert!(plan.fetch.iter().all(|b| world.resident.insert(*b)));

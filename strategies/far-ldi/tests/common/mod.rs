@@ -11,7 +11,9 @@ use farfield_core::cell::{Active, Cell, Outline, Sector, Split, Window};
 use farfield_core::claim::Claim;
 use farfield_core::context::{Capture, Context, Executor, Forget, Shot};
 use farfield_core::draw::{DrawList, Pass, PassKind};
-use farfield_core::id::{AssetId, Block, CellId, ChunkId, LocalPayload, MaterialId, PayloadRef, SectorId, SplitId, TargetId};
+use farfield_core::id::{
+    AssetId, Block, CellId, ChunkId, LocalPayload, MaterialId, PayloadRef, SectorId, SplitId, TargetId,
+};
 use farfield_core::image::SurfaceImage;
 use farfield_core::mesh::TriangleMesh;
 use farfield_core::payload::Payload;
@@ -198,7 +200,8 @@ pub(crate) fn pipes(n: u32, seed: u64) -> Scene {
         if at.length() < 10.0 + length {
             continue;
         }
-        let size = if kind == 0 { Vec3::new(radius, length, radius) } else { Vec3::new(2.5, 2.0, 3.0) * (0.5 + radius) };
+        let size =
+            if kind == 0 { Vec3::new(radius, length, radius) } else { Vec3::new(2.5, 2.0, 3.0) * (0.5 + radius) };
         let turn = match turn {
             0 => DQuat::IDENTITY,
             1 => DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2),
@@ -253,7 +256,13 @@ pub(crate) fn loaded(scene: &Scene, kept: &Kept, splats: SplatOrder) -> CpuBacke
 }
 
 /// What a cell's images show through a camera.
-pub(crate) fn warped(backend: &mut CpuBackend, scene: &Scene, kept: &Kept, split: u32, camera: &Camera) -> SurfaceImage {
+pub(crate) fn warped(
+    backend: &mut CpuBackend,
+    scene: &Scene,
+    kept: &Kept,
+    split: u32,
+    camera: &Camera,
+) -> SurfaceImage {
     let open = ldi("").open(None, (AssetId(3), &kept.index)).unwrap();
     let sectors = (0..kept.payloads.len() as u32).map(SectorId).collect();
     let at = Active { cell: CellId(0), split: SplitId(split), sectors };
@@ -278,6 +287,8 @@ pub(crate) struct Apart {
     pub(crate) pixels: u64,
     /// Something should be there and nothing is.
     pub(crate) holes: u64,
+    /// Holes not on an outline: the eight pixels around should show the same object.
+    pub(crate) inner: u64,
     /// Nothing should be there and something is.
     pub(crate) extra: u64,
     /// Another object.
@@ -292,11 +303,11 @@ impl Apart {
             let (r, p) = (reference.hit(i), picture.hit(i));
             self.pixels += 1;
             self.holes += u64::from(r && !p);
+            self.inner += u64::from(r && !p && !outline(reference, i));
             self.extra += u64::from(p && !r);
             self.other += u64::from(p && r && reference.object[i] != picture.object[i]);
             if r && p {
-                let d: u32 =
-                    (0..3).map(|k| u32::from(reference.albedo[i][k].abs_diff(picture.albedo[i][k]))).sum();
+                let d: u32 = (0..3).map(|k| u32::from(reference.albedo[i][k].abs_diff(picture.albedo[i][k]))).sum();
                 self.albedo += f64::from(d) / 3.0;
             }
         }
@@ -322,4 +333,14 @@ pub(crate) fn tour(cell: &Cell, views: &ViewModel, n: u32, seed: u64) -> Vec<Cam
             }
         })
         .collect()
+}
+
+/// Whether some pixel around shows another object, or lies outside.
+fn outline(image: &SurfaceImage, i: usize) -> bool {
+    let [w, h] = image.size.map(|n| n as i32);
+    let (x, y) = (i as i32 % w, i as i32 / w);
+    let differs = |u: i32, v: i32| {
+        !(0..w).contains(&u) || !(0..h).contains(&v) || image.object[(v * w + u) as usize] != image.object[i]
+    };
+    (-1..2).any(|dy| (-1..2).any(|dx| differs(x + dx, y + dy)))
 }
