@@ -83,9 +83,10 @@ fn nine_images_leave_few_holes_where_one_leaves_many_and_keep_each_surface_once(
             let apart = walked(&scene, &cell, &kept, &cameras, order);
             let holes = apart.share(apart.holes);
             println!(
-                "{n} images, {order:?}: holes {:.3} %, too much {:.3} %, another object {:.2} %, {} samples, {:.2} a covered pixel, \
+                "{n} images, {order:?}: holes {:.3} %, {:.3} % off outlines, too much {:.3} %, another object {:.2} %, {} samples, {:.2} a covered pixel, \
                  {} at most",
                 100.0 * holes,
+                100.0 * apart.share(apart.inner),
                 100.0 * apart.share(apart.extra),
                 100.0 * apart.share(apart.other),
                 p.samples,
@@ -93,9 +94,9 @@ fn nine_images_leave_few_holes_where_one_leaves_many_and_keep_each_surface_once(
                 p.deepest
             );
             match n {
-                1 => assert!(holes > 0.01 && p.samples == p.covered),
-                5 => assert!(holes < 0.5 * before),
-                _ => assert!(holes < before && holes < 0.002),
+                1 => assert!(holes > 0.03 && p.samples == p.covered),
+                5 => assert!(holes < 0.4 * before),
+                _ => assert!(holes < 0.8 * before && holes < 0.01 && apart.share(apart.inner) < 0.002),
             }
             if order == SplatOrder::OcclusionCompatible {
                 before = holes;
@@ -158,17 +159,22 @@ fn cells_with_windows_all_round_show_everything_around() {
         let cameras = round(&cell, &v, 9);
         let apart = walked(&scene, &cell, &kept, &cameras, SplatOrder::Nearest);
         println!(
-            "{name}: {} images, {:?}, holes {:.3} %, too much {:.3} %, another object {:.2} %",
+            "{name}: {} images, {:?}, holes {:.3} %, {:.3} % off outlines, too much {:.3} %, another object {:.2} %",
             index.pictures.len(),
             index.pictures.iter().map(|p| p.size).collect::<Vec<_>>(),
             100.0 * apart.share(apart.holes),
+            100.0 * apart.share(apart.inner),
             100.0 * apart.share(apart.extra),
             100.0 * apart.share(apart.other)
         );
-        assert!(apart.share(apart.holes) < 0.005);
         let one = bake(&scene, &v, &cell, "max_px = 2048\nconstruction_images = 1", 2);
         let worse = walked(&scene, &cell, &one, &cameras, SplatOrder::Nearest);
-        assert!(worse.holes > 3 * apart.holes, "{} holes with one image", worse.holes);
+        println!(
+            "with one image {:.3} %, {:.3} % off outlines",
+            100.0 * worse.share(worse.holes),
+            100.0 * worse.share(worse.inner)
+        );
+        assert!(apart.share(apart.inner) < 0.01 && worse.inner > 4 * apart.inner && worse.holes > 2 * apart.holes);
     }
 }
 
