@@ -9,7 +9,7 @@ use farfield_core::strategy::{Covers, LeftOut};
 use serde::Serialize;
 
 use crate::build::{NoCapture, Pool};
-use crate::config::Experiment;
+use crate::config::{BuildWhen, Experiment};
 use crate::failure::Failure;
 use crate::run::Prepared;
 
@@ -36,7 +36,7 @@ pub struct PipelinePlan {
     pub name: String,
     /// Whether something is built for the scene as a whole.
     pub scene_asset: bool,
-    /// Cells that are built.
+    /// Cells that are built ahead of the walk.
     pub cells_built: usize,
     /// Cells that the path visits.
     pub cells_needed: usize,
@@ -94,7 +94,7 @@ fn of_pipeline(
         };
         near.push(cell.splits.iter().map(of_split).max().unwrap_or(0));
         if needs.cell_asset {
-            cells_built += 1;
+            cells_built += usize::from(p.build == BuildWhen::Ahead);
             if needs.captures {
                 let centre = cell.outline.centre.as_dvec3();
                 texels += cell.splits.iter().map(|s| texels_of(prepared, &s.far, centre)).sum::<u64>();
@@ -102,6 +102,7 @@ fn of_pipeline(
         }
     }
     left_out.extend(division.left_out());
+    left_out.extend(p.build.left_out(division));
     left_out.sort_by(|a, b| (&a.stage, &a.reason).cmp(&(&b.stage, &b.reason)));
     left_out.dedup();
     Ok(PipelinePlan {

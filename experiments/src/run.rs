@@ -72,9 +72,14 @@ pub fn prepare(experiment: &Experiment, options: &Options<'_>) -> Result<Prepare
     let scene = Arc::new(loaded.scene);
     let views = path::views(&experiment.view, &scene);
     let cameras = path::cameras(&experiment.view, &views, &scene)?;
-    let mut divisions = vec![];
-    for p in &experiment.pipelines {
-        divisions.push(build::divide(p, &scene, &views, &cameras, options.cancel)?);
+    let mut divisions: Vec<Division> = vec![];
+    for (i, p) in experiment.pipelines.iter().enumerate() {
+        // Pipelines with the same partition share its cells.
+        let same = experiment.pipelines[..i].iter().position(|q| q.resolved["partition"] == p.resolved["partition"]);
+        divisions.push(match same {
+            Some(j) => divisions[j].clone(),
+            None => build::divide(p, &scene, &views, &cameras, options.cancel)?,
+        });
         let refused = |f| Failure::before(format!("pipeline \"{}\": its far field", p.name), f);
         p.far_field.needs(&scene, None).map_err(refused)?;
     }

@@ -1,5 +1,6 @@
 //! A pipeline's cells, and those that the path needs. Nothing is built here.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use farfield_core::Camera;
@@ -14,9 +15,10 @@ use crate::config::{BuildWhen, Pipeline};
 use crate::failure::Failure;
 
 /// A pipeline's cells and the path through them.
+#[derive(Clone)]
 pub struct Division {
     /// All cells.
-    pub cells: Box<dyn Cells>,
+    pub cells: Arc<dyn Cells>,
     /// The cell of every frame.
     pub path: Vec<Option<CellId>>,
     /// The cells that the path visits, ascending.
@@ -36,7 +38,7 @@ pub fn divide(
 ) -> Result<Division, Failure> {
     let cx = Context { capture: &NoCapture, run: &Pool, memo: &Forget, cancel };
     let refused = |f| Failure::before(format!("pipeline \"{}\": its partition", pipeline.name), f);
-    let cells = pipeline.partition.divide(scene, views, &cx).map_err(refused)?;
+    let cells: Arc<dyn Cells> = pipeline.partition.divide(scene, views, &cx).map_err(refused)?.into();
     let path: Vec<Option<CellId>> = cameras.iter().map(|c| cells.find(c)).collect();
     let mut needed: Vec<CellId> = path.iter().flatten().copied().collect();
     needed.sort_unstable();
@@ -65,7 +67,7 @@ impl Division {
 
 impl BuildWhen {
     /// What is not built ahead of the walk.
-    pub(super) fn left_out(self, division: &Division) -> Option<LeftOut> {
+    pub(crate) fn left_out(self, division: &Division) -> Option<LeftOut> {
         let reason = || format!("{} visited cells are built on demand, when they are wanted", division.needed.len());
         (self == Self::OnDemand).then(|| LeftOut {
             stage: "building ahead".into(),
