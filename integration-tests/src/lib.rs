@@ -2,4 +2,5 @@
 
 pub mod conformance;
 pub mod lab;
+pub mod ldi;
 pub mod stones;
