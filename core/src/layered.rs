@@ -44,7 +44,8 @@ pub struct LayeredPart {
     /// Object numbers + 1, as the object plane has them.
     pub objects: Vec<u32>,
     /// Drawn smoothed: albedo and normal of a covered pixel are averaged with those of the covered ones among its eight
-    /// neighbours, with weights 1 2 1, 2 4 2, 1 2 1 (Aliaga and Lastra 1999, section 5). Only pixels that this image covers take part.
+    /// neighbours, with weights 1 2 1, 2 4 2, 1 2 1 (Aliaga and Lastra 1999, section 5). Only pixels that this image covers, before
+    /// any other image of the pass, take part.
     pub smooth: bool,
 }
 

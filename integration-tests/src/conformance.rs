@@ -9,12 +9,15 @@
 //!   faces; whoever imports mirrored instances reverses their triangles.
 //! - A two-sided surface's normal is turned when n . (point - eye) > 0, whatever its winding.
 //! - A surface pass clears its target: albedo 0, normal 0, depth infinite, object 0 where nothing is drawn.
+//! - Of layered depth images that cover a pixel at one depth the one drawn first is seen; a smoothed one averages over those pixels
+//!   that it covers before every other image of the pass.
 //! - A pass without draws, a chunk without triangles and a part without triangles are no errors.
 
 mod contract;
 mod facing;
 mod fixture;
 mod geometry;
+mod layered;
 mod light;
 mod paint;
 mod projected;
@@ -40,6 +43,7 @@ pub fn suite(make: Make<'_>) {
     part("facing", facing::all);
     part("paint", paint::all);
     part("projected", projected::all);
+    part("layered", layered::all);
     part("light", light::all);
     part("reference: soup", reference::soup);
     part("reference: instances", reference::instances);

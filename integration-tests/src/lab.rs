@@ -65,13 +65,19 @@ impl Lab {
     /// # Errors
     /// What building and opening say.
     pub fn with<R>(&self, pipeline: usize, f: impl FnOnce(&Opened<'_>) -> R) -> Result<R, String> {
+        Ok(f(&self.opened(pipeline)?))
+    }
+
+    /// Builds a pipeline and opens it.
+    ///
+    /// # Errors
+    /// What building and opening say.
+    pub fn opened(&self, pipeline: usize) -> Result<Opened<'_>, String> {
         let options = options(self.store.root());
         let mut built = run::build_pipelines(&self.experiment, &self.prepared, &[pipeline], &self.store, &options)
             .map_err(|f| told(&f))?;
         let (p, division) = (&self.experiment.pipelines[pipeline], &self.prepared.divisions[pipeline]);
-        let opened =
-            Opened::new(p, division, built.remove(0), &self.prepared.scene, &self.store).map_err(|f| told(&f))?;
-        Ok(f(&opened))
+        Opened::new(p, division, built.remove(0), &self.prepared.scene, &self.store).map_err(|f| told(&f))
     }
 
     /// A device with the scene resident.

@@ -4,6 +4,7 @@
 mod book;
 pub mod conformance;
 pub mod lab;
+pub mod ldi;
 pub mod pair;
 pub mod stones;
 pub mod turned;

@@ -1,7 +1,7 @@
 //! wgpu and Vulkan side by side on one device and one scene, held against each other plane by plane; and the frames that they
 //! draw: everything, or some draws, then light.
 
-use farfield_core::backend::{Backend, BlockData, upload_scene};
+use farfield_core::backend::{Backend, BlockData, Counted, upload_scene};
 use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind, Shading};
 use farfield_core::id::{Block, PayloadRef, TargetId};
 use farfield_core::image::{Picture, SurfaceImage};
@@ -30,16 +30,26 @@ pub struct Pair {
 /// # Panics
 /// When a device is expected and missing, or the two take different sizes of blocks.
 pub fn pair(test: &str, scene: &Scene) -> Option<Pair> {
+    pair_of(test, scene, false)
+}
+
+/// The same, with `halves` as if the device had no 64-bit atomics.
+///
+/// # Panics
+/// As [`pair`].
+pub fn pair_of(test: &str, scene: &Scene, halves: bool) -> Option<Pair> {
     let skip = |why: String| {
         assert!(std::env::var_os("FARFIELD_EXPECT_DEVICE").is_none_or(|v| v != "1"), "{test}: {why}");
         eprintln!("SKIPPED: {test}: {why}");
     };
-    let vulkan =
-        VulkanBackend::new(scene, farfield_vulkan::Options::default()).map_err(|e| skip(e.to_string())).ok()?;
+    let without = farfield_vulkan::Without { atomics_64: halves, ..Default::default() };
+    let options = farfield_vulkan::Options { without, ..Default::default() };
+    let vulkan = VulkanBackend::new(scene, options).map_err(|e| skip(e.to_string())).ok()?;
     let device = vulkan.info().device.clone();
     // wgpu is to take the very device that Vulkan took; its own name is the part before the driver's.
     let adapter = device.split(',').next().map(str::to_owned);
-    let options = farfield_wgpu::Options { adapter, ..farfield_wgpu::Options::default() };
+    let without = farfield_wgpu::Without { atomics_64: halves, ..Default::default() };
+    let options = farfield_wgpu::Options { adapter, without, ..Default::default() };
     let wgpu = WgpuBackend::new(scene, &options).map_err(|e| skip(e.to_string())).ok()?;
     let mut pair = Pair { wgpu, vulkan, exact: device.contains("llvmpipe") };
     let bytes = upload_scene(&mut pair.wgpu, scene).unwrap();
@@ -65,7 +75,8 @@ impl Pair {
     #[track_caller]
     pub fn check(&mut self, what: &str, list: &DrawList) -> (SurfaceImage, Picture) {
         let (a, b) = (self.wgpu.render(list).unwrap(), self.vulkan.render(list).unwrap());
-        assert_eq!((a.near_triangles, a.far_triangles), (b.near_triangles, b.far_triangles), "{what}");
+        let counts = |c: &Counted| (c.near_triangles, c.far_triangles, c.samples, c.clipped_primitives);
+        assert_eq!(counts(&a), counts(&b), "{what}");
         let surface = self.vulkan.read_surface(TargetId(0)).unwrap();
         let other = self.wgpu.read_surface(TargetId(0)).unwrap();
         self.same_surface(what, &other, &surface);

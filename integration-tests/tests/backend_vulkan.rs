@@ -8,7 +8,7 @@ use std::cell::RefCell;
 use farfield_core::backend::Backend;
 use farfield_core::scene::SceneBuilder;
 use farfield_integration_tests::conformance::suite;
-use farfield_vulkan::{Journal, Options, VulkanBackend};
+use farfield_vulkan::{Journal, Options, VulkanBackend, Without};
 
 /// What keeps the suite from being run: no device, or one too coarse for it.
 fn unfit() -> Result<(), String> {
@@ -23,16 +23,17 @@ fn unfit() -> Result<(), String> {
     }
 }
 
-#[test]
-fn the_vulkan_backend_conforms_without_a_word_from_validation() {
+/// Runs the suite under validation, without some features.
+fn conforms(test: &str, without: Without) {
     if let Err(why) = unfit() {
         assert!(std::env::var_os("FARFIELD_EXPECT_DEVICE").is_none_or(|v| v != "1"), "{why}");
-        eprintln!("SKIPPED: the_vulkan_backend_conforms_without_a_word_from_validation: {why}");
+        eprintln!("SKIPPED: {test}: {why}");
         return;
     }
     let journals: RefCell<Vec<Journal>> = RefCell::default();
     suite(&|scene| {
-        let backend = VulkanBackend::new(scene, Options { validation: true, ..Options::default() }).expect("a backend");
+        let options = Options { validation: true, without, ..Options::default() };
+        let backend = VulkanBackend::new(scene, options).expect("a backend");
         journals.borrow_mut().push(backend.journal());
         Box::new(backend)
     });
@@ -40,4 +41,15 @@ fn the_vulkan_backend_conforms_without_a_word_from_validation() {
     assert!(!journals.is_empty(), "the suite made no backend");
     let said: Vec<String> = journals.iter().flat_map(Journal::messages).collect();
     assert!(said.is_empty(), "validation says:\n{}", said.join("\n"));
+}
+
+#[test]
+fn the_vulkan_backend_conforms_without_a_word_from_validation() {
+    conforms("the_vulkan_backend_conforms_without_a_word_from_validation", Without::default());
+}
+
+#[test]
+fn the_fallbacks_conform_too() {
+    let without = Without { indirect: true, timestamps: true, statistics: true, atomics_64: true };
+    conforms("the_fallbacks_conform_too", without);
 }

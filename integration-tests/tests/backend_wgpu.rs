@@ -87,8 +87,10 @@ fn the_fallbacks_conform_too() {
     if !device("the_fallbacks_conform_too") {
         return;
     }
-    let options =
-        Options { without: Without { indirect: true, timestamps: true, statistics: true }, ..Options::default() };
+    let options = Options {
+        without: Without { indirect: true, timestamps: true, statistics: true, atomics_64: true },
+        ..Options::default()
+    };
     suite(&|scene| Box::new(WgpuBackend::new(scene, &options).expect("a backend")));
 }
 

@@ -28,12 +28,9 @@ fn walk(lab: &Lab, limit: Option<u64>, frames: usize) -> (Vec<Walked>, Rendered)
     };
     let budget = farfield_experiments::config::BudgetSettings { upload_bytes_per_frame: limit, ..Default::default() };
     let mut device = Device::new(device::open(BackendName::Cpu, &p.scene).unwrap());
-    let walked = lab.with(0, |opened| {
-        let mut walker = Walker::new(&tour, opened, &mut device, &budget);
-        let frames = cameras.iter().map(|c| walker.step(c).unwrap()).collect();
-        (frames, walker.read().unwrap())
-    });
-    walked.unwrap()
+    let mut walker = Walker::new(&tour, lab.opened(0).unwrap(), None, &mut device, &budget);
+    let frames = cameras.iter().map(|c| walker.step(c).unwrap()).collect();
+    (frames, walker.read().unwrap())
 }
 
 #[test]

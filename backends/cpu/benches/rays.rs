@@ -64,7 +64,7 @@ fn main() {
     let eye = middle + DVec3::new(-20.0, 6.0, 45.0);
     let camera = Camera::looking(eye, (middle - eye).as_vec3() + Vec3::Y * 4.0, Vec3::Y, 1.0, [1024, 1024], 0.1);
     for threads in [None, Some(1)] {
-        let mut b = CpuBackend::new(&scene, CpuOptions { threads }).expect("a backend");
+        let mut b = CpuBackend::new(&scene, CpuOptions { threads, ..CpuOptions::default() }).expect("a backend");
         upload_scene(&mut b, &scene).expect("the scene is uploaded");
         let what = DrawWhat::Chunks(scene.all_chunks());
         let draws = vec![Draw { what, bounds: scene.bounds, error_px: 0.0 }];

@@ -78,8 +78,8 @@ impl CpuBackend {
                 counted.far_triangles += frame.far_triangles;
                 counted.samples += frame.images.iter().map(|(_, i)| i.samples() as u64).sum::<u64>();
                 let mut image = Self::within(pool, || paint::surface(&frame, &pass.camera, true));
-                for (origin, part) in &frame.images {
-                    warp::over(&mut image, &pass.camera, *origin, part, self.splats);
+                if !frame.images.is_empty() {
+                    warp::over(&mut image, &pass.camera, &frame.images, self.splats);
                 }
                 Target::Surface(image)
             }

@@ -1,10 +1,14 @@
-//! Layered depth images drawn over what was cast: samples are thrown one by one, then each image is composed by depth.
+//! Layered depth images drawn over what was cast: samples are thrown one by one, the images composed by depth, then all of them
+//! with the rest.
 //!
 //! Within an image no depths are compared by default: samples are drawn in McMillan's *occlusion-compatible order* (McMillan and
 //! Bishop 1995). In the plane through both eyes and a ray, the way from the viewer to a sample crosses only rays nearer to the epipole, the
 //! viewer's own image, so that drawing towards the epipole (away from it where the viewer stands behind the image's eye) and
 //! each pixel from back to front is drawing from back to front. [`SplatOrder::Nearest`] compares depths instead, as the GPU
 //! backends do: the nearest sample of a pixel wins, of equal ones the last. The two differ where splats larger than a pixel overlap.
+//!
+//! Among images the nearer covers a pixel, of equally near ones the one drawn first; a smoothed pixel averages those of its neighbours
+//! that the same image covers *so*. A GPU backend, where all images of a pass compete for one buffer, sees no others.
 //!
 //! O(samples * splat area + pixels * images), on one thread: the reference.
 
@@ -28,19 +32,36 @@ pub enum SplatOrder {
 /// Weights of the smoothing kernel, by the distance in rows plus columns from the middle.
 const KERNEL: [f32; 3] = [4.0, 2.0, 1.0];
 
-/// What covers a pixel: depth and sample.
-type Cover = Option<(f32, u32)>;
+/// What covers a pixel.
+#[derive(Clone, Copy)]
+struct Cover {
+    depth: f32,
+    /// Which of the pass's images.
+    image: u32,
+    sample: u32,
+}
 
-/// Draws a layered depth image over a surface image.
-pub(crate) fn over(into: &mut SurfaceImage, to: &Camera, origin: DVec3, image: &LayeredPart, order: SplatOrder) {
-    let cover = thrown(to, origin, image, order);
+/// Draws layered depth images, each with where its payload stands, over a surface image.
+pub(crate) fn over(into: &mut SurfaceImage, to: &Camera, images: &[(DVec3, &LayeredPart)], order: SplatOrder) {
+    let mut cover: Vec<Option<Cover>> = vec![None; into.depth.len()];
+    for (number, &(origin, image)) in (0u32..).zip(images) {
+        for (nearest, own) in cover.iter_mut().zip(thrown(to, origin, image, order)) {
+            if let Some((depth, sample)) = own
+                && nearest.is_none_or(|n| depth < n.depth)
+            {
+                *nearest = Some(Cover { depth, image: number, sample });
+            }
+        }
+    }
     let [w, h] = to.size.map(|s| s as usize);
     for (i, covered) in cover.iter().enumerate() {
-        let Some((depth, sample)) = *covered else { continue };
+        let Some(Cover { depth, image: number, sample }) = *covered else { continue };
         if depth >= into.depth[i] {
             continue;
         }
-        let (albedo, normal) = if image.smooth { smoothed(image, &cover, [w, h], i) } else { look(image, sample) };
+        let image = images[number as usize].1;
+        let (albedo, normal) =
+            if image.smooth { smoothed(image, number, &cover, [w, h], i) } else { look(image, sample) };
         into.depth[i] = depth;
         into.object[i] = image.objects[usize::from(image.object[sample as usize])];
         into.albedo[i] = texel::encode(albedo);
@@ -54,13 +75,13 @@ fn look(image: &LayeredPart, sample: u32) -> (Vec3, Vec3) {
     (texel::decode([r, g, b, 255]), image.normal_at(sample as usize))
 }
 
-/// The average over a pixel and the covered ones around it.
-fn smoothed(image: &LayeredPart, cover: &[Cover], [w, h]: [usize; 2], i: usize) -> (Vec3, Vec3) {
+/// The average over a pixel and those around it that the same image covers.
+fn smoothed(image: &LayeredPart, number: u32, cover: &[Option<Cover>], [w, h]: [usize; 2], i: usize) -> (Vec3, Vec3) {
     let (x, y) = (i % w, i / w);
     let (mut albedo, mut normal, mut weight) = (Vec3::ZERO, Vec3::ZERO, 0.0);
     for v in y.saturating_sub(1)..(y + 2).min(h) {
         for u in x.saturating_sub(1)..(x + 2).min(w) {
-            if let Some((_, sample)) = cover[v * w + u] {
+            if let Some(Cover { sample, .. }) = cover[v * w + u].filter(|c| c.image == number) {
                 let k = KERNEL[u.abs_diff(x) + v.abs_diff(y)];
                 let (a, n) = look(image, sample);
                 (albedo, normal, weight) = (albedo + a * k, normal + n * k, weight + k);
@@ -70,9 +91,10 @@ fn smoothed(image: &LayeredPart, cover: &[Cover], [w, h]: [usize; 2], i: usize) 
     (albedo / weight, normal.normalize_or_zero())
 }
 
-fn thrown(to: &Camera, origin: DVec3, image: &LayeredPart, order: SplatOrder) -> Vec<Cover> {
+/// Depth and sample that one image puts in each pixel.
+fn thrown(to: &Camera, origin: DVec3, image: &LayeredPart, order: SplatOrder) -> Vec<Option<(f32, u32)>> {
     let width = to.size[0] as usize;
-    let mut cover: Vec<Cover> = vec![None; width * to.size[1] as usize];
+    let mut cover: Vec<Option<(f32, u32)>> = vec![None; width * to.size[1] as usize];
     let warp = Warp::new(&image.camera, origin, to);
     let first = image.first_samples();
     let mut throw = |x: u32, y: u32, sample: u32| {

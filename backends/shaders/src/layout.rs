@@ -4,7 +4,9 @@
 //! frame's [`Record`]s (binding 1); group 1 holds, for chunks, the texture (0) and a repeating linear sampler (1); for
 //! projected parts, a page of [`GpuProjector`]s (0), a clamping linear sampler (1) and [`ATLAS_SLOTS`] pairs of albedo and
 //! normal arrays (2, 3), (4, 5), ...; plain meshes have no group 1. The shading shader: group 0 holds [`ShadeUniform`]
-//! (binding 0, dynamic offset), group 1 the albedo, normal, depth and object planes (0 to 3).
+//! (binding 0, dynamic offset), group 1 the albedo, normal, depth and object planes (0 to 3). The shaders of layered depth images:
+//! group 0 holds [`WarpUniform`] (binding 0, dynamic offset), a page of [`GpuSample`]s (1) and the pass's splats (2), 8 bytes a
+//! pixel, written by the warp and read by what resolves it.
 //!
 //! Formats, in wgpu's names. Surface target: albedo Rgba8UnormSrgb, normal R32Uint (octahedral), linear depth R32Float, object
 //! R32Uint, all cleared to 0, and a depth buffer Depth32Float, reversed: cleared to 0, passes where Greater. Picture:
@@ -77,6 +79,62 @@ pub struct GpuProjector {
     pub high: [f32; 2],
     /// The atlas layer.
     pub layer: u32,
+    /// Nothing.
+    pub unused: [u32; 3],
+}
+
+/// A sample of a layered depth image as the shaders read it. Behind an image's samples lie its objects, four in the room of one.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct GpuSample {
+    /// Linear, along the image's forward axis.
+    pub depth: f32,
+    /// Its pixel in the image.
+    pub pixel: [u16; 2],
+    /// Octahedral bytes, local frame.
+    pub normal: [i8; 2],
+    /// An index into the image's objects.
+    pub object: u16,
+    /// sRGB; the fourth byte is nothing.
+    pub albedo: [u8; 4],
+}
+
+/// What is the same for all samples of an image that is warped in a pass: [`farfield_core::layered::Warp`] and where things lie.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct WarpUniform {
+    /// The image's eye relative to the viewer's.
+    pub offset: [f32; 4],
+    /// From the image's eye to the centre of its first pixel, one unit ahead.
+    pub corner: [f32; 4],
+    /// From a pixel's ray to that of its right neighbour.
+    pub step_x: [f32; 4],
+    /// From a pixel's ray to that of the one below.
+    pub step_y: [f32; 4],
+    /// The viewer's right.
+    pub right: [f32; 4],
+    /// The viewer's up.
+    pub up: [f32; 4],
+    /// The viewer's forward.
+    pub forward: [f32; 4],
+    /// The viewer's tangents at the left and the top, pixels a unit tangent across and down.
+    pub picture: [f32; 4],
+    /// The viewer's width and height, pixels.
+    pub size: [u32; 2],
+    /// The viewer's near distance.
+    pub near: f32,
+    /// 1 where the image is drawn smoothed.
+    pub smoothed: u32,
+    /// The index of the first sample in its page.
+    pub first: u32,
+    /// How many samples there are.
+    pub samples: u32,
+    /// The index of the page's element at which the objects start.
+    pub objects: u32,
+    /// 255 for the first image of a pass, 254 for the next; never 0.
+    pub ordinal: u32,
+    /// See [`crate::warp::Atomics::phases`].
+    pub phase: u32,
     /// Nothing.
     pub unused: [u32; 3],
 }
@@ -202,7 +260,7 @@ pub fn vertex_layout(shader: Shader) -> (u32, &'static [Attribute]) {
         Shader::Projected => {
             (24, const { &[at(0, 0, Float32x3), at(1, 12, Uint32), at(2, 16, Unorm8x4), at(3, 20, Uint32)] })
         }
-        Shader::Shade => (0, &[]),
+        Shader::Shade | Shader::Warp | Shader::WarpHalves | Shader::Resolve => (0, &[]),
     }
 }
 
@@ -222,6 +280,7 @@ mod tests {
             ("View", size_of::<ViewUniform>()),
             ("Shade", size_of::<ShadeUniform>()),
             ("Light", size_of::<GpuLight>()),
+            ("Warp", size_of::<WarpUniform>()),
         ];
         for shader in Shader::ALL {
             let module = naga::front::wgsl::parse_str(shader.wgsl()).unwrap();

@@ -1,12 +1,13 @@
-//! Packing: chunks and payload parts as vertices, indices and projectors. O(n).
+//! Packing: chunks and payload parts as vertices, indices, projectors and samples. O(n).
 
 use std::collections::HashMap;
 
 use farfield_core::image::octahedral;
+use farfield_core::layered::LayeredPart;
 use farfield_core::mesh::ChunkMesh;
 use farfield_core::payload::{MeshPart, ProjectedPart};
 
-use crate::layout::{ChunkVertex, GpuProjector, MeshVertex, ProjectedVertex};
+use crate::layout::{ChunkVertex, GpuProjector, GpuSample, MeshVertex, ProjectedVertex};
 
 /// A chunk's vertices, in its order.
 pub fn chunk_vertices(c: &ChunkMesh) -> Vec<ChunkVertex> {
@@ -72,10 +73,38 @@ pub fn projectors(p: &ProjectedPart, slot_of: impl Fn(usize) -> u32) -> Vec<GpuP
         .collect()
 }
 
+/// A layered depth image: its samples in their order, then its objects, the last elements filled up with 0. Columns and rows of its
+/// pixels are below 2^16.
+pub fn samples(l: &LayeredPart) -> Vec<GpuSample> {
+    let width = l.camera.size[0];
+    let pixels = l.counts.iter().zip(0u32..).flat_map(|(&n, i)| std::iter::repeat_n(i, usize::from(n)));
+    let mut out: Vec<GpuSample> = pixels
+        .enumerate()
+        .map(|(s, pixel)| {
+            let [r, g, b] = l.albedo[s];
+            GpuSample {
+                depth: l.depth_at(s),
+                pixel: [(pixel % width) as u16, (pixel / width) as u16],
+                normal: l.normal[s],
+                object: l.object[s],
+                albedo: [r, g, b, 0],
+            }
+        })
+        .collect();
+    if !out.is_empty() {
+        out.extend(l.objects.chunks(4).map(|c| {
+            let four: [u32; 4] = std::array::from_fn(|i| c.get(i).copied().unwrap_or(0));
+            bytemuck::cast::<_, GpuSample>(four)
+        }));
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
+    use farfield_core::Camera;
+    use glam::{DVec3, Vec3};
 
     #[test]
     fn triangles_share_a_vertex_only_where_they_share_their_views() {
@@ -94,5 +123,33 @@ mod tests {
             let position = part.mesh.positions[*original as usize].to_array();
             assert_eq!(vertices[*packed as usize].position, position);
         }
+    }
+
+    #[test]
+    fn samples_know_their_pixels_and_objects_follow_them() {
+        let camera = Camera::looking(DVec3::ZERO, Vec3::X, Vec3::Y, 1.0, [2, 3], 0.1);
+        let part = LayeredPart {
+            camera,
+            inverse_depth: [1.0, 0.25],
+            counts: vec![1, 0, 0, 2, 0, 1],
+            depth: vec![0, 65535, 0, 65535],
+            albedo: vec![[1, 2, 3]; 4],
+            normal: vec![[127, 0], [0, -127], [-1, 1], [5, 6]],
+            object: vec![4, 0, 1, 2],
+            objects: vec![10, 11, 12, 13, 14],
+            smooth: false,
+        };
+        let packed = samples(&part);
+        let of = |f: &dyn Fn(&GpuSample) -> u32| packed[..4].iter().map(f).collect::<Vec<_>>();
+        assert_eq!(of(&|s| u32::from(s.pixel[0]) + 10 * u32::from(s.pixel[1])), [0, 11, 11, 21]);
+        assert_eq!(of(&|s| s.depth as u32), [1, 4, 1, 4]);
+        let words: &[u32] = bytemuck::cast_slice(&packed);
+        // As the shader takes them apart: normal in the low half, object in the high one.
+        assert_eq!([words[2], words[6], words[10]], [4 << 16 | 127, 0x8100, 1 << 16 | 0x01ff]);
+        assert_eq!(words[3], 0x0003_0201);
+        assert_eq!(words[16..], [10, 11, 12, 13, 14, 0, 0, 0]);
+        let none =
+            LayeredPart { counts: vec![0; 6], depth: vec![], albedo: vec![], normal: vec![], object: vec![], ..part };
+        assert!(samples(&none).is_empty());
     }
 }

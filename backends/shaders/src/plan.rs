@@ -2,7 +2,8 @@
 //!
 //! One record and one command a placed chunk or payload part, over the whole frame; a batch is a run of commands that share
 //! pipeline, pages and textures, so that a device with multi-draw-indirect takes each in one call. Draws keep their order
-//! within a batch, batches are sorted by their key: the same list over the same residency is the same plan. O(n log batches).
+//! within a batch, batches are sorted by their key: the same list over the same residency is the same plan. Layered depth images
+//! keep their order and follow the batches of their pass. O(n log batches).
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
@@ -11,12 +12,15 @@ use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind, Shading};
 use farfield_core::id::{AssetId, Block, LocalPayload, TargetId, TextureId};
 use farfield_core::scene::LightKind;
 use farfield_core::{Camera, Fault};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::Shader;
-use crate::layout::{ATLAS_SLOTS, DrawCommand, GpuLight, Record, ShadeUniform, UNIFORM_ALIGN, ViewUniform};
+use crate::layout::{
+    ATLAS_SLOTS, DrawCommand, GpuLight, Record, ShadeUniform, UNIFORM_ALIGN, ViewUniform, WarpUniform,
+};
 use crate::records::{Cull, SceneTable, payload_record};
-use crate::residency::{PartSlot, Residency, Slot};
+use crate::residency::{LayeredSlot, PartSlot, Residency, Slot};
+use crate::warp::{self, LayeredDraw, SPLAT_BYTES};
 
 /// A frame, ready to be carried out.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,6 +37,8 @@ pub struct FramePlan {
     pub near_triangles: u64,
     /// Triangles of payloads submitted.
     pub far_triangles: u64,
+    /// Samples of layered depth images submitted.
+    pub samples: u64,
 }
 
 /// A pass.
@@ -46,6 +52,16 @@ pub struct PassPlan {
     pub uniform_offset: u32,
     /// What it does.
     pub work: Work,
+    /// Layered depth images drawn over the batches of a surface pass, in order.
+    pub layered: Vec<LayeredDraw>,
+}
+
+impl PassPlan {
+    /// Bytes of its splats: 0 where it draws no layered depth image.
+    pub fn splat_bytes(&self) -> u64 {
+        let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
+        if self.layered.is_empty() { 0 } else { SPLAT_BYTES * pixels }
+    }
 }
 
 /// What a pass does.
@@ -108,6 +124,21 @@ pub struct Written {
     pub pictures: HashMap<TargetId, [u32; 2]>,
 }
 
+impl FramePlan {
+    /// Bytes of the largest pass's splats, 0 where no pass has any.
+    pub fn splat_bytes(&self) -> u64 {
+        self.passes.iter().map(PassPlan::splat_bytes).max().unwrap_or(0)
+    }
+
+    /// Appends a uniform and returns its offset.
+    fn uniform(&mut self, bytes: &[u8]) -> u32 {
+        let at = self.uniforms.len() as u32;
+        self.uniforms.extend_from_slice(bytes);
+        self.uniforms.resize(self.uniforms.len().next_multiple_of(UNIFORM_ALIGN), 0);
+        at
+    }
+}
+
 impl Written {
     /// To be called when a plan was carried out.
     pub fn note(&mut self, plan: &FramePlan) {
@@ -143,7 +174,7 @@ impl Written {
 pub struct Limits {
     /// The largest width or height of a target, pixels.
     pub target_px: u32,
-    /// The largest storage binding, bytes: it holds the frame's records.
+    /// The largest storage binding, bytes: it holds the frame's records, or a pass's splats.
     pub storage_bytes: u64,
 }
 
@@ -151,8 +182,8 @@ pub struct Limits {
 ///
 /// # Errors
 /// [`Fault::Refused`] where a draw names a block that is not resident, a chunk, a part or an atlas that does not exist, where a
-/// shading pass reads what no earlier pass wrote or what has another size, has too many lights, or where the list does not fit
-/// the device's limits.
+/// shading pass reads what no earlier pass wrote or what has another size, has too many lights, where a surface pass has more
+/// than [`warp::MAX_IMAGES`] layered depth images, or where the list does not fit the device's limits.
 pub fn plan(
     list: &DrawList,
     table: &SceneTable,
@@ -169,13 +200,13 @@ pub fn plan(
                 format!("a target of {} x {} pixels; this device takes 1 to {}", size[0], size[1], limits.target_px);
             return Err(Fault::Refused(cause));
         }
-        let uniform_offset = out.uniforms.len() as u32;
-        let work = match &pass.kind {
+        let mut layered = vec![];
+        let (uniform_offset, work) = match &pass.kind {
             PassKind::Surface => {
                 let view = ViewUniform { projection: pass.camera.projection().to_cols_array_2d() };
-                out.uniforms.extend_from_slice(bytemuck::bytes_of(&view));
+                let at = out.uniform(bytemuck::bytes_of(&view));
                 surfaces.insert(pass.writes, size);
-                Work::Surface(surface(pass, table, residency, &mut out)?)
+                (at, Work::Surface(surface(pass, table, residency, &mut out, &mut layered)?))
             }
             PassKind::Shade { surface, shading } => {
                 match surfaces.get(surface) {
@@ -191,12 +222,21 @@ pub fn plan(
                         return Err(Fault::Refused(cause));
                     }
                 }
-                out.uniforms.extend_from_slice(bytemuck::bytes_of(&shade_uniform(&pass.camera, shading)?));
-                Work::Shade(*surface)
+                let at = out.uniform(bytemuck::bytes_of(&shade_uniform(&pass.camera, shading)?));
+                (at, Work::Shade(*surface))
             }
         };
-        out.uniforms.resize(out.uniforms.len().next_multiple_of(UNIFORM_ALIGN), 0);
-        out.passes.push(PassPlan { target: pass.writes, size, uniform_offset, work });
+        let made = PassPlan { target: pass.writes, size, uniform_offset, work, layered };
+        if made.splat_bytes() > limits.storage_bytes {
+            return Err(Fault::Refused(format!(
+                "layered depth images over {} x {} pixels need {} bytes of splats; this device binds {}",
+                size[0],
+                size[1],
+                made.splat_bytes(),
+                limits.storage_bytes
+            )));
+        }
+        out.passes.push(made);
     }
     let bytes = (out.records.len() * size_of::<Record>()) as u64;
     if bytes > limits.storage_bytes {
@@ -237,10 +277,32 @@ impl Batches {
     }
 }
 
-fn surface(pass: &Pass, table: &SceneTable, residency: &Residency, out: &mut FramePlan) -> Result<Vec<Batch>, Fault> {
+fn surface(
+    pass: &Pass,
+    table: &SceneTable,
+    residency: &Residency,
+    out: &mut FramePlan,
+    layered: &mut Vec<LayeredDraw>,
+) -> Result<Vec<Batch>, Fault> {
     let mut batches = Batches::default();
+    // Images are counted by what the list names, so that which are empty does not decide what is refused.
+    let mut images = 0;
     for draw in &pass.draws {
-        push_draw(draw, &pass.camera, table, residency, out, &mut batches)?;
+        match image_of(draw, residency)? {
+            Some((slot, origin)) => {
+                let first = warp::uniform(&slot, origin, &pass.camera, images)?;
+                images += 1;
+                if slot.samples == 0 {
+                    continue;
+                }
+                let uniform_offset = out.uniform(bytemuck::bytes_of(&first));
+                out.uniform(bytemuck::bytes_of(&WarpUniform { phase: 1, ..first }));
+                let workgroups = warp::workgroups(slot.samples);
+                layered.push(LayeredDraw { page: slot.span.page, uniform_offset, workgroups });
+                out.samples += u64::from(slot.samples);
+            }
+            None => push_draw(draw, &pass.camera, table, residency, out, &mut batches)?,
+        }
     }
     let mut done = vec![];
     for (key, i) in batches.index {
@@ -249,6 +311,19 @@ fn surface(pass: &Pass, table: &SceneTable, residency: &Residency, out: &mut Fra
         done.push(Batch { key, commands: first..out.commands.len() as u32 });
     }
     Ok(done)
+}
+
+/// The layered depth image that a draw names and where its payload stands; `None` where it names something else.
+fn image_of(draw: &Draw, residency: &Residency) -> Result<Option<(LayeredSlot, DVec3)>, Fault> {
+    let DrawWhat::Payload { id, part, object } = &draw.what else { return Ok(None) };
+    let Some(payload) = residency.payload_slot(*id) else { return Ok(None) };
+    match payload.parts.get(usize::from(*part)) {
+        Some(PartSlot::Layered(_)) if *object != 0 => {
+            Err(Fault::Refused(format!("part {part} of {id:?}: the samples have objects of their own")))
+        }
+        Some(PartSlot::Layered(slot)) => Ok(Some((*slot, payload.origin))),
+        _ => Ok(None),
+    }
 }
 
 fn push_draw(
@@ -298,7 +373,9 @@ fn push_draw(
                 Some(PartSlot::Atlas { .. }) => {
                     return Err(Fault::Refused(format!("{} is an atlas: not drawable", of())));
                 }
-                None => return Err(Fault::Refused(format!("{}: there is no such part", of()))),
+                Some(PartSlot::Layered(_)) | None => {
+                    return Err(Fault::Refused(format!("{}: there is no such part", of())));
+                }
             };
             out.far_triangles += u64::from(slot.indices.len / 3);
             batches.push(key, slot, out.records.len() as u32);
@@ -357,9 +434,11 @@ mod tests {
     use farfield_core::backend::BlockData;
     use farfield_core::draw::Shading;
     use farfield_core::id::MaterialId;
+    use farfield_core::layered::LayeredPart;
     use farfield_core::mesh::TriangleMesh;
+    use farfield_core::payload::{Part, Payload};
     use farfield_core::scene::{Light, Material, Placement, Scene, SceneBuilder, Texture};
-    use glam::{DAffine3, DVec3};
+    use glam::DAffine3;
 
     const LIMITS: Limits = Limits { target_px: 4096, storage_bytes: 1 << 20 };
 
@@ -442,6 +521,64 @@ mod tests {
         let (a, b) = (planned(&scene, passes()).unwrap(), planned(&scene, passes()).unwrap());
         assert_eq!(a, b);
         assert!(a.passes.iter().all(|p| (p.uniform_offset as usize).is_multiple_of(UNIFORM_ALIGN)));
+    }
+
+    /// A residency of images with so many samples each, and draws of them.
+    fn images(samples: &[usize]) -> (Residency, Vec<Draw>) {
+        let mut r = Residency::new(PageSizes::for_device(1 << 28), 1 << 27);
+        let draw = |(i, &n): (u32, &usize)| {
+            let part = LayeredPart {
+                camera: Camera::looking(DVec3::ZERO, -Vec3::Z, Vec3::Y, 1.0, [1, 1], 0.1),
+                inverse_depth: [1.0, 0.5],
+                counts: vec![n as u8],
+                depth: vec![0; n],
+                albedo: vec![[9; 3]; n],
+                normal: vec![[0, 127]; n],
+                object: vec![0; n],
+                objects: vec![1],
+                smooth: false,
+            };
+            let payload = Payload { origin: DVec3::ZERO, bounds: Aabb::EMPTY, parts: vec![Part::Layered(part)] };
+            let id = farfield_core::id::PayloadRef { asset: AssetId(0), id: LocalPayload(i) };
+            r.place(Block::Payload(id), &BlockData::Payload(&payload)).unwrap();
+            Draw { what: DrawWhat::Payload { id, part: 0, object: 0 }, bounds: Aabb::EMPTY, error_px: 0.0 }
+        };
+        let draws = (0u32..).zip(samples).map(draw).collect();
+        (r, draws)
+    }
+
+    #[test]
+    fn images_are_numbered_down_in_the_order_of_their_draws() {
+        let scene = scene(1);
+        let (r, draws) = images(&[2, 0, 3]);
+        let list = DrawList { passes: vec![Pass { draws, ..surface_pass(&scene, 0) }] };
+        let p = plan(&list, &SceneTable::new(&scene), &r, &Written::default(), LIMITS).unwrap();
+        assert_eq!((p.samples, p.splat_bytes(), p.passes[0].layered.len()), (5, 8 * 64 * 48, 2));
+        let uniform = |at: u32| {
+            bytemuck::pod_read_unaligned::<WarpUniform>(&p.uniforms[at as usize..][..size_of::<WarpUniform>()])
+        };
+        for (draw, (ordinal, samples)) in p.passes[0].layered.iter().zip([(255, 2), (253, 3)]) {
+            for phase in 0..2 {
+                let u = uniform(draw.uniform_offset + phase * UNIFORM_ALIGN as u32);
+                assert_eq!((u.ordinal, u.samples, u.phase, u.objects), (ordinal, samples, phase, u.first + samples));
+            }
+        }
+    }
+
+    #[test]
+    fn images_that_do_not_fit_are_refused_with_their_cause() {
+        let scene = scene(1);
+        let refusal = |r: &Residency, draws: Vec<Draw>, limits| {
+            let list = DrawList { passes: vec![Pass { draws, ..surface_pass(&scene, 0) }] };
+            plan(&list, &SceneTable::new(&scene), r, &Written::default(), limits).unwrap_err().to_string()
+        };
+        let (r, draws) = images(&[1; 256]);
+        assert!(refusal(&r, draws.clone(), LIMITS).contains("more than 255 layered depth images"));
+        let tight = Limits { storage_bytes: 8 * 64 * 48 - 1, ..LIMITS };
+        assert!(refusal(&r, draws[..1].to_vec(), tight).contains("64 x 48 pixels need 24576 bytes of splats"));
+        let DrawWhat::Payload { id, part, .. } = draws[0].what else { panic!("a payload") };
+        let named = Draw { what: DrawWhat::Payload { id, part, object: 7 }, ..draws[0].clone() };
+        assert!(refusal(&r, vec![named], LIMITS).contains("objects of their own"));
     }
 
     #[test]

@@ -18,12 +18,25 @@ pub enum Stream {
     Indices,
     /// [`crate::layout::GpuProjector`], a read-only storage buffer.
     Projectors,
+    /// [`crate::layout::GpuSample`] and objects of layered depth images, a read-only storage buffer.
+    Samples,
 }
 
 impl Stream {
     /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::ChunkVertices, Self::MeshVertices, Self::ProjectedVertices, Self::Indices, Self::Projectors];
+    pub const ALL: [Self; 6] = [
+        Self::ChunkVertices,
+        Self::MeshVertices,
+        Self::ProjectedVertices,
+        Self::Indices,
+        Self::Projectors,
+        Self::Samples,
+    ];
+
+    /// Whether shaders read it through a storage binding, whose size devices bound.
+    pub fn is_storage(self) -> bool {
+        matches!(self, Self::Projectors | Self::Samples)
+    }
 
     /// Bytes of an element.
     pub fn stride(self) -> u64 {
@@ -33,6 +46,7 @@ impl Stream {
             Self::ProjectedVertices => 24,
             Self::Indices => 4,
             Self::Projectors => 112,
+            Self::Samples => 16,
         }
     }
 }
@@ -53,7 +67,7 @@ pub struct PageSizes {
     pub first_bytes: u64,
     /// No page grows beyond.
     pub usual_bytes: u64,
-    /// What the device takes at most in one buffer (and, for projectors, in one storage binding).
+    /// What the device takes at most in one buffer (and, for projectors and samples, in one storage binding).
     pub max_bytes: u64,
 }
 
@@ -146,6 +160,11 @@ impl Pool {
         Some((Span { page: self.pages.len() as u32 - 1, first, len }, Some(bytes)))
     }
 
+    /// The largest page, bytes.
+    pub fn max_bytes(&self) -> u64 {
+        self.sizes.max_bytes
+    }
+
     /// Gives a range back.
     pub fn give(&mut self, span: Span) {
         if span.len > 0 {
@@ -167,7 +186,7 @@ mod tests {
 
     #[test]
     fn strides_are_those_of_the_structs() {
-        use crate::layout::{ChunkVertex, GpuProjector, MeshVertex, ProjectedVertex};
+        use crate::layout::{ChunkVertex, GpuProjector, GpuSample, MeshVertex, ProjectedVertex};
         use std::mem::size_of;
         let of = [
             size_of::<ChunkVertex>(),
@@ -175,6 +194,7 @@ mod tests {
             size_of::<ProjectedVertex>(),
             size_of::<u32>(),
             size_of::<GpuProjector>(),
+            size_of::<GpuSample>(),
         ];
         for (stream, size) in Stream::ALL.into_iter().zip(of) {
             assert_eq!(stream.stride(), size as u64, "{stream:?}");

@@ -2,15 +2,17 @@
 
 use std::collections::HashMap;
 
-use farfield_core::Fault;
 use farfield_core::backend::{BlockData, validate};
 use farfield_core::id::{AssetId, Block, LocalPayload, MeshChunkId, PayloadRef};
+use farfield_core::layered::LayeredPart;
 use farfield_core::payload::{MeshPart, Part, Payload, ProjectedPart};
+use farfield_core::{Camera, Fault};
 use glam::DVec3;
 
 use crate::layout::ATLAS_SLOTS;
 use crate::pack;
 use crate::pool::{PageId, PageSizes, Pool, Span, Stream};
+use crate::warp::{MAX_IMAGE_PX, MAX_SAMPLES};
 
 /// Where drawable triangles lie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +21,19 @@ pub struct Slot {
     pub vertices: Span,
     /// Their indices.
     pub indices: Span,
+}
+
+/// Where a layered depth image lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LayeredSlot {
+    /// Its samples, and its objects behind them.
+    pub span: Span,
+    /// How many samples.
+    pub samples: u32,
+    /// Its camera, the eye relative to the payload's origin.
+    pub camera: Camera,
+    /// Whether it is drawn smoothed.
+    pub smooth: bool,
 }
 
 /// A resident part of a payload.
@@ -47,6 +62,8 @@ pub enum PartSlot {
         /// Whether there are none.
         empty: bool,
     },
+    /// A layered depth image.
+    Layered(LayeredSlot),
 }
 
 /// A resident payload.
@@ -75,23 +92,23 @@ pub struct Placement {
 /// The blocks on a device.
 #[derive(Debug)]
 pub struct Residency {
-    pools: [Pool; 5],
+    pools: [Pool; Stream::ALL.len()],
     /// With whether there are texture coordinates.
     chunks: HashMap<MeshChunkId, (Slot, bool)>,
     payloads: HashMap<PayloadRef, PayloadSlot>,
 }
 
 impl Residency {
-    /// Nothing resident. `storage_max_bytes` bounds a page of projectors.
+    /// Nothing resident. `storage_max_bytes` bounds a page of projectors or samples.
     pub fn new(sizes: PageSizes, storage_max_bytes: u64) -> Self {
         let bound = sizes.max_bytes.min(storage_max_bytes);
-        let projectors = PageSizes {
+        let storage = PageSizes {
             first_bytes: (1 << 20).min(bound),
             usual_bytes: sizes.usual_bytes.min(bound),
             max_bytes: bound,
         };
         Self {
-            pools: Stream::ALL.map(|s| Pool::new(s, if s == Stream::Projectors { projectors } else { sizes })),
+            pools: Stream::ALL.map(|s| Pool::new(s, if s.is_storage() { storage } else { sizes })),
             chunks: HashMap::new(),
             payloads: HashMap::new(),
         }
@@ -101,7 +118,8 @@ impl Residency {
     ///
     /// # Errors
     /// [`Fault::Data`] where the block contradicts itself, [`Fault::Refused`] where a projected part draws from more than
-    /// [`ATLAS_SLOTS`] atlases, [`Fault::Device`] where no buffer of the device can hold a part. The block is then not there.
+    /// [`ATLAS_SLOTS`] atlases or a layered depth image has more samples than a storage binding or a splat's number takes or more
+    /// than [`MAX_IMAGE_PX`] pixels across or down, [`Fault::Device`] where no buffer of the device can hold a part. The block is then not there.
     pub fn place(&mut self, block: Block, data: &BlockData<'_>) -> Result<Placement, Fault> {
         validate(block, data)?;
         self.release(block);
@@ -154,7 +172,7 @@ impl Residency {
                     }
                     Ok(PartSlot::Atlas { empty: a.albedo.is_empty() })
                 }
-                Part::Layered(_) => Err(Fault::Refused(format!("{block:?}: GPU backends draw no layered depth image"))),
+                Part::Layered(l) => self.layered(block, l, out),
             };
             match slot {
                 Ok(slot) => made.parts.push(slot),
@@ -192,6 +210,28 @@ impl Residency {
             .inspect_err(|_| self.pools[Stream::Projectors as usize].give(projectors))?;
         let atlases = std::array::from_fn(|i| named.get(i).copied());
         Ok(PartSlot::Projected { slot, two_sided: p.mesh.two_sided, projectors, atlases })
+    }
+
+    fn layered(&mut self, block: Block, l: &LayeredPart, out: &mut Placement) -> Result<PartSlot, Fault> {
+        let refuse = |cause: String| Err(Fault::Refused(format!("{block:?}: a layered depth image of {cause}")));
+        let [w, h] = l.camera.size;
+        if w.max(h) > MAX_IMAGE_PX {
+            return refuse(format!("{w} x {h} pixels; this backend takes {MAX_IMAGE_PX} each way"));
+        }
+        if l.samples() > MAX_SAMPLES {
+            return refuse(format!("{} samples; this backend takes {MAX_SAMPLES}", l.samples()));
+        }
+        let stride = Stream::Samples.stride();
+        let bytes = (l.samples() + l.objects.len().div_ceil(4)) as u64 * stride;
+        let most = self.pools[Stream::Samples as usize].max_bytes();
+        if bytes > most {
+            let n = l.samples();
+            return refuse(format!("{n} samples needs {bytes} bytes in one storage binding; this device binds {most}"));
+        }
+        let packed = pack::samples(l);
+        let span = self.bytes(block, Stream::Samples, bytemuck::cast_slice(&packed), out)?;
+        let samples = l.samples() as u32;
+        Ok(PartSlot::Layered(LayeredSlot { span, samples, camera: l.camera, smooth: l.smooth }))
     }
 
     fn triangles(
@@ -252,6 +292,7 @@ impl Residency {
                     self.give_slot(Stream::ProjectedVertices, *slot);
                     self.pools[Stream::Projectors as usize].give(*projectors);
                 }
+                PartSlot::Layered(slot) => self.pools[Stream::Samples as usize].give(slot.span),
                 PartSlot::Atlas { .. } => {}
             }
         }
@@ -369,6 +410,56 @@ mod tests {
         assert!(matches!(fault, Fault::Device { .. }), "{fault}");
         let again = r.place(block, &BlockData::Chunk(&chunk(25))).unwrap();
         assert_eq!(again.pages[0].0, PageId { stream: Stream::ChunkVertices, index: 0 }, "the page is to be made anew");
+    }
+
+    /// One image of 4 x 2 pixels with as many samples, in one pixel after the other.
+    fn image(samples: usize) -> Payload {
+        let camera = Camera::looking(DVec3::ZERO, Vec3::X, Vec3::Y, 1.0, [4, 2], 0.1);
+        let part = LayeredPart {
+            camera,
+            inverse_depth: [1.0, 0.5],
+            counts: (0..8).map(|i| samples.saturating_sub(255 * i).min(255) as u8).collect(),
+            depth: vec![7; samples],
+            albedo: vec![[1, 2, 3]; samples],
+            normal: vec![[0, 127]; samples],
+            object: vec![4; samples],
+            objects: vec![1, 2, 3, 4, 5],
+            smooth: true,
+        };
+        Payload { origin: DVec3::ONE, bounds: Aabb::EMPTY, parts: vec![Part::Layered(part)] }
+    }
+
+    #[test]
+    fn images_take_whole_elements_and_give_them_back() {
+        let mut r = residency(4096);
+        let first = r.place(Block::Payload(id(0)), &BlockData::Payload(&image(10))).unwrap();
+        // Ten samples, and two elements for five objects.
+        assert_eq!((first.bytes, first.writes[0].2.len()), (192, 192));
+        r.place(Block::Payload(id(1)), &BlockData::Payload(&image(3))).unwrap();
+        let span = |r: &Residency, n| match r.payload_slot(id(n)).unwrap().parts[0] {
+            PartSlot::Layered(s) => (s.span.first, s.span.len, s.samples, s.smooth),
+            _ => panic!("an image"),
+        };
+        assert_eq!([span(&r, 0), span(&r, 1)], [(0, 12, 10, true), (12, 5, 3, true)]);
+        r.release(Block::Payload(id(0)));
+        r.place(Block::Payload(id(2)), &BlockData::Payload(&image(10))).unwrap();
+        assert_eq!(span(&r, 2).0, 0, "the freed range is used again");
+    }
+
+    #[test]
+    fn images_too_large_are_refused_and_leave_nothing() {
+        let mut r = residency(4096);
+        let fault = r.place(Block::Payload(id(0)), &BlockData::Payload(&image(255))).unwrap_err();
+        assert!(matches!(&fault, Fault::Refused(c) if c.contains("4112 bytes in one storage binding")), "{fault}");
+        let mut wide = image(0);
+        if let Part::Layered(l) = &mut wide.parts[0] {
+            l.camera.size = [MAX_IMAGE_PX + 1, 1];
+            l.counts = vec![0; MAX_IMAGE_PX as usize + 1];
+        }
+        let fault = r.place(Block::Payload(id(0)), &BlockData::Payload(&wide)).unwrap_err();
+        assert!(matches!(&fault, Fault::Refused(c) if c.contains("65537 x 1 pixels")), "{fault}");
+        assert!(r.payload_slot(id(0)).is_none());
+        r.place(Block::Payload(id(0)), &BlockData::Payload(&image(254))).unwrap();
     }
 
     #[test]

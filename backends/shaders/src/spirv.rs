@@ -7,7 +7,7 @@ use farfield_core::Fault;
 use naga::back::spv;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 
-use crate::{FRAGMENT_ENTRY, Shader, VERTEX_ENTRY};
+use crate::{COMPUTE_ENTRY, FRAGMENT_ENTRY, Shader, VERTEX_ENTRY};
 
 /// What the device promises of accesses out of range; decides which checks naga writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +25,8 @@ pub enum Stage {
     Vertex,
     /// The fragment stage.
     Fragment,
+    /// The compute stage.
+    Compute,
 }
 
 /// The SPIR-V of one stage of a shader, as words; the entry point keeps its name. `version` is the SPIR-V version: (1, 3) for
@@ -36,7 +38,9 @@ pub fn compile(shader: Shader, stage: Stage, version: (u8, u8), robust: Robustne
     let source = shader.wgsl();
     let bad = |cause: String| Fault::Data { place: format!("the shader for {}", shader.label()), cause };
     let module = naga::front::wgsl::parse_str(source).map_err(|e| bad(e.emit_to_string(source)))?;
-    let info = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty())
+    // Of the shaders here Warp alone uses either; devices that lack them take WarpHalves.
+    let wide = naga::valid::Capabilities::SHADER_INT64 | naga::valid::Capabilities::SHADER_INT64_ATOMIC_MIN_MAX;
+    let info = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), wide)
         .validate(&module)
         .map_err(|e| bad(e.emit_to_string(source)))?;
     let checked = |robust| if robust { BoundsCheckPolicy::Unchecked } else { BoundsCheckPolicy::Restrict };
@@ -58,10 +62,12 @@ pub fn compile(shader: Shader, stage: Stage, version: (u8, u8), robust: Robustne
         shader_stage: match stage {
             Stage::Vertex => naga::ShaderStage::Vertex,
             Stage::Fragment => naga::ShaderStage::Fragment,
+            Stage::Compute => naga::ShaderStage::Compute,
         },
         entry_point: match stage {
             Stage::Vertex => VERTEX_ENTRY,
             Stage::Fragment => FRAGMENT_ENTRY,
+            Stage::Compute => COMPUTE_ENTRY,
         }
         .into(),
     };
@@ -76,11 +82,23 @@ mod tests {
     fn every_stage_of_every_shader_compiles() {
         let robust = Robustness { buffer: true, image: true };
         for shader in Shader::ALL {
-            for stage in [Stage::Vertex, Stage::Fragment] {
+            for &stage in shader.stages() {
                 let words = compile(shader, stage, (1, 3), robust).unwrap();
                 assert_eq!(words[0], 0x0723_0203, "{shader:?}");
                 assert_eq!(words[1], 0x0001_0300, "{shader:?}");
             }
+        }
+    }
+
+    #[test]
+    fn only_the_whole_warp_needs_wide_numbers() {
+        // OpCapability (17, two words long) Int64 (11) or Int64Atomics (12).
+        let wide = |shader: Shader, stage| {
+            let words = compile(shader, stage, (1, 3), Robustness { buffer: true, image: true }).unwrap();
+            words.windows(2).any(|w| w[0] == 2 << 16 | 17 && [11, 12].contains(&w[1]))
+        };
+        for shader in Shader::ALL {
+            assert!(shader.stages().iter().all(|&s| wide(shader, s) == (shader == Shader::Warp)), "{shader:?}");
         }
     }
 

@@ -234,7 +234,7 @@ impl Backend for VulkanBackend {
             wall_ms: start.elapsed().as_secs_f64() * 1e3,
             near_triangles: plan.near_triangles,
             far_triangles: plan.far_triangles,
-            samples: 0,
+            samples: plan.samples,
             clipped_primitives,
         })
     }

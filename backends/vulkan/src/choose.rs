@@ -1,6 +1,6 @@
 //! Which device to run on, and what it can do.
 //!
-//! Of the devices that have what the backend cannot do without (a graphics queue, dynamic rendering, synchronization2,
+//! Of the devices that have what the backend cannot do without (a queue for graphics and compute, dynamic rendering, synchronization2,
 //! 32-bit float depth), and whose name holds the filter if there is one, the first of the best kind is taken: discrete
 //! before integrated, virtual, software. What may be missing is degraded, in words.
 
@@ -8,6 +8,7 @@ use std::ffi::CStr;
 
 use ash::{ext, khr, vk};
 use farfield_core::Fault;
+use farfield_shaders::warp::Atomics;
 
 use crate::instance::{Instance, no_device};
 
@@ -45,6 +46,8 @@ pub(crate) struct Caps {
     pub(crate) limits: vk::PhysicalDeviceLimits,
     /// The largest allocation, and so the largest buffer, bytes.
     pub(crate) max_buffer: u64,
+    /// Vulkan 1.2 is spoken: 64-bit atomics are no extension.
+    pub(crate) core_1_2: bool,
     /// Vulkan 1.3 is spoken; else the two KHR extensions are there.
     pub(crate) core_1_3: bool,
     /// Bits of a timestamp; 0 where the queue has none.
@@ -52,6 +55,8 @@ pub(crate) struct Caps {
     pub(crate) statistics: bool,
     /// Many indirect draws in one call, each with its first instance.
     pub(crate) multi_draw: bool,
+    /// Whole where shaderInt64 and shaderBufferInt64Atomics are there.
+    pub(crate) atomics: Atomics,
     /// SPIR-V version that goes with the API version.
     pub(crate) spirv: (u8, u8),
     pub(crate) robustness: Robustness,
@@ -68,6 +73,8 @@ pub struct Without {
     pub timestamps: bool,
     /// No primitives are counted.
     pub statistics: bool,
+    /// Layered depth images are warped by 32-bit atomics, in two phases.
+    pub atomics_64: bool,
 }
 
 /// The best device whose name holds `filter` (case does not matter), used without the features of `without`.
@@ -113,10 +120,12 @@ fn examine(instance: &Instance, physical: vk::PhysicalDevice, without: Without) 
 
     // SAFETY: as above.
     let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
-    let Some(family) = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::GRAPHICS)) else {
-        return refuse("it has no graphics queue");
+    let both = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+    let Some(family) = families.iter().position(|f| f.queue_flags.contains(both)) else {
+        return refuse("it has no queue for graphics and compute");
     };
 
+    let core_1_2 = properties.api_version.min(instance.api) >= vk::API_VERSION_1_2;
     let core_1_3 = properties.api_version.min(instance.api) >= vk::API_VERSION_1_3;
     // SAFETY: as above.
     let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }.unwrap_or_default();
@@ -128,6 +137,7 @@ fn examine(instance: &Instance, physical: vk::PhysicalDevice, without: Without) 
     let mut sync = vk::PhysicalDeviceSynchronization2Features::default();
     let mut two = vk::PhysicalDeviceRobustness2FeaturesEXT::default();
     let mut image = vk::PhysicalDeviceImageRobustnessFeatures::default();
+    let mut atomics = vk::PhysicalDeviceShaderAtomicInt64Features::default();
     let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut rendering).push_next(&mut sync);
     let has_two = has(ext::robustness2::NAME);
     if has_two {
@@ -135,6 +145,9 @@ fn examine(instance: &Instance, physical: vk::PhysicalDevice, without: Without) 
     }
     if core_1_3 || has(ext::image_robustness::NAME) {
         features = features.push_next(&mut image);
+    }
+    if core_1_2 || has(khr::shader_atomic_int64::NAME) {
+        features = features.push_next(&mut atomics);
     }
     // SAFETY: as above.
     unsafe { instance.raw.get_physical_device_features2(physical, &mut features) };
@@ -152,6 +165,7 @@ fn examine(instance: &Instance, physical: vk::PhysicalDevice, without: Without) 
     let timestamp_bits = if without.timestamps { 0 } else { families[family].timestamp_valid_bits };
     let statistics = on(f.pipeline_statistics_query) && !without.statistics;
     let multi_draw = on(f.multi_draw_indirect) && on(f.draw_indirect_first_instance) && !without.indirect;
+    let whole = on(f.shader_int64) && on(atomics.shader_buffer_int64_atomics) && !without.atomics_64;
     let mut degraded = vec![];
     let mut lacks = |there: bool, words: &str| {
         if !there {
@@ -161,6 +175,7 @@ fn examine(instance: &Instance, physical: vk::PhysicalDevice, without: Without) 
     lacks(timestamp_bits > 0, "no timestamps: gpu_ms is left out");
     lacks(statistics, "no pipeline statistics: clipped primitives are not counted");
     lacks(multi_draw, "no multi-draw-indirect with first instances: one direct draw call a record");
+    lacks(whole, Atomics::LACKING);
     let robustness = Robustness {
         buffer: on(f.robust_buffer_access),
         two: has_two.then(|| [on(two.robust_buffer_access2), on(two.robust_image_access2)]),
@@ -187,10 +202,12 @@ fn examine(instance: &Instance, physical: vk::PhysicalDevice, without: Without) 
         name,
         limits: properties.limits,
         max_buffer: most.max_memory_allocation_size,
+        core_1_2,
         core_1_3,
         timestamp_bits,
         statistics,
         multi_draw,
+        atomics: if whole { Atomics::Whole } else { Atomics::Halves },
         spirv: match properties.api_version.min(instance.api) {
             v if v >= vk::API_VERSION_1_3 => (1, 6),
             v if v >= vk::API_VERSION_1_2 => (1, 5),

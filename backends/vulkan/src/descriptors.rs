@@ -49,6 +49,8 @@ pub(crate) struct SetLayouts {
     pub(crate) shade: vk::DescriptorSetLayout,
     /// The shading shader, group 1: four planes.
     pub(crate) planes: vk::DescriptorSetLayout,
+    /// The shaders of layered depth images, group 0: their uniform, samples, splats.
+    pub(crate) samples: vk::DescriptorSetLayout,
 }
 
 impl SetLayouts {
@@ -56,8 +58,15 @@ impl SetLayouts {
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self, Fault> {
         use vk::DescriptorType as Kind;
         let null = vk::DescriptorSetLayout::null();
-        let mut made =
-            Self { gpu: gpu.clone(), frame: null, texture: null, projection: null, shade: null, planes: null };
+        let mut made = Self {
+            gpu: gpu.clone(),
+            frame: null,
+            texture: null,
+            projection: null,
+            shade: null,
+            planes: null,
+            samples: null,
+        };
         let (both, fragment) =
             (vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT, vk::ShaderStageFlags::FRAGMENT);
         let image = Kind::SAMPLED_IMAGE;
@@ -68,6 +77,8 @@ impl SetLayouts {
         made.projection = layout(gpu, &projection, fragment)?;
         made.shade = layout(gpu, &[Kind::UNIFORM_BUFFER_DYNAMIC], fragment)?;
         made.planes = layout(gpu, &[image; 4], fragment)?;
+        let samples = [Kind::UNIFORM_BUFFER_DYNAMIC, Kind::STORAGE_BUFFER, Kind::STORAGE_BUFFER];
+        made.samples = layout(gpu, &samples, fragment | vk::ShaderStageFlags::COMPUTE)?;
         Ok(made)
     }
 
@@ -78,13 +89,14 @@ impl SetLayouts {
             Shader::Mesh => vec![self.frame],
             Shader::Projected => vec![self.frame, self.projection],
             Shader::Shade => vec![self.shade, self.planes],
+            Shader::Warp | Shader::WarpHalves | Shader::Resolve => vec![self.samples],
         }
     }
 }
 
 impl Drop for SetLayouts {
     fn drop(&mut self) {
-        for layout in [self.frame, self.texture, self.projection, self.shade, self.planes] {
+        for layout in [self.frame, self.texture, self.projection, self.shade, self.planes, self.samples] {
             // SAFETY: made from this device, destroyed once (null is allowed).
             unsafe { self.gpu.raw.destroy_descriptor_set_layout(layout, None) };
         }
@@ -204,7 +216,7 @@ fn new_pool(gpu: &Gpu) -> Result<vk::DescriptorPool, Fault> {
     let size = |kind, each: u32| vk::DescriptorPoolSize { ty: kind, descriptor_count: each * SETS_A_POOL };
     let sizes = [
         size(vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC, 1),
-        size(vk::DescriptorType::STORAGE_BUFFER, 1),
+        size(vk::DescriptorType::STORAGE_BUFFER, 2),
         size(vk::DescriptorType::SAMPLER, 1),
         size(vk::DescriptorType::SAMPLED_IMAGE, (2 * ATLAS_SLOTS as u32).max(4)),
     ];

@@ -25,6 +25,7 @@ use crate::record::{Recorder, Use};
 use crate::submit::Submitter;
 use crate::targets::{Shaded, Surface};
 use crate::textures::{Atlas, Sampler, SceneTextures};
+use crate::warp::{SampleSets, Splats};
 
 /// What a pass writes and reads.
 pub(crate) enum Target {
@@ -48,6 +49,7 @@ pub(crate) struct Frames {
     /// Bound where a part has no projectors.
     no_projectors: Buffer,
     clamp: Sampler,
+    splats: Splats,
 }
 
 /// The descriptor sets of a frame.
@@ -57,6 +59,7 @@ struct FrameSets {
     binds: BTreeMap<Bind, vk::DescriptorSet>,
     /// Of each pass, the planes that it reads.
     planes: Vec<vk::DescriptorSet>,
+    samples: SampleSets,
 }
 
 /// Time on the device, milliseconds, and primitives that reached the clipper, where it has either.
@@ -83,6 +86,7 @@ impl Frames {
             blank: Atlas::blank(gpu, &mut blocks.staging, by)?,
             no_projectors: buffer("no projectors", RECORDS)?,
             clamp: Sampler::new(gpu, vk::SamplerAddressMode::CLAMP_TO_EDGE)?,
+            splats: Splats::new(gpu)?,
         })
     }
 
@@ -189,7 +193,8 @@ impl Frames {
                 binds.insert(bind, set);
             }
         }
-        Ok(FrameSets { surface, shade, binds, planes })
+        let samples = self.splats.bind(plan, &mut self.sets, layouts.samples, self.uniforms.raw, blocks)?;
+        Ok(FrameSets { surface, shade, binds, planes, samples })
     }
 
     #[expect(clippy::too_many_arguments, reason = "what one pass needs of the frame, the blocks and the plan")]
@@ -203,18 +208,14 @@ impl Frames {
         blocks: &Blocks,
         sets: &FrameSets,
     ) {
+        self.splats.warp(record, pass, &self.pipelines, &sets.samples);
         let mut changes: Vec<_> = to.planes.iter().map(|p| (p, Use::DISCARD, Use::COLOR)).collect();
         changes.push((&to.depth, Use::DISCARD, Use::DEPTH));
         record.images(&changes);
         record.pass(&to.planes, Some(&to.depth), to.size, || {
             for batch in batches {
                 let key = &batch.key;
-                let stream = match key.shader {
-                    Shader::Chunk => Stream::ChunkVertices,
-                    Shader::Mesh => Stream::MeshVertices,
-                    Shader::Projected => Stream::ProjectedVertices,
-                    Shader::Shade => continue,
-                };
+                let Some(stream) = key.shader.vertices() else { continue };
                 // A page that does not exist is named by draws of nothing only.
                 let (Some(vertices), Some(indices)) =
                     (blocks.page(stream, key.vertex_page), blocks.page(Stream::Indices, key.index_page))
@@ -231,6 +232,7 @@ impl Frames {
                 let commands = &plan.commands[batch.commands.start as usize..batch.commands.end as usize];
                 record.draws(&self.commands, batch.commands.start, commands);
             }
+            self.splats.resolve(record, pass, &self.pipelines, &sets.samples);
         });
         let rest: Vec<_> = to.planes.iter().map(|p| (p, Use::COLOR, Use::SAMPLED)).collect();
         record.images(&rest);

@@ -7,6 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use ash::{ext, khr, vk};
 use farfield_core::Fault;
+use farfield_shaders::warp::Atomics;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use crate::choose::{Caps, Without, choose};
@@ -37,7 +38,9 @@ impl Gpu {
         let refused = |e: vk::Result| Fault::Device { device: caps.name.clone(), cause: format!("does not open: {e}") };
 
         let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(caps.family).queue_priorities(&[1.0])];
+        let whole = caps.atomics == Atomics::Whole;
         let features = vk::PhysicalDeviceFeatures::default()
+            .shader_int64(whole)
             .pipeline_statistics_query(caps.statistics)
             .multi_draw_indirect(caps.multi_draw)
             .draw_indirect_first_instance(caps.multi_draw)
@@ -55,11 +58,15 @@ impl Gpu {
             .robust_buffer_access2(buffer)
             .robust_image_access2(image);
         let mut image = vk::PhysicalDeviceImageRobustnessFeatures::default().robust_image_access(true);
+        let mut atomics = vk::PhysicalDeviceShaderAtomicInt64Features::default().shader_buffer_int64_atomics(true);
         if caps.robustness.two.is_some() {
             names.push(ext::robustness2::NAME.as_ptr());
         }
         if caps.robustness.image == Some(true) {
             names.push(ext::image_robustness::NAME.as_ptr());
+        }
+        if whole && !caps.core_1_2 {
+            names.push(khr::shader_atomic_int64::NAME.as_ptr());
         }
         let mut info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
@@ -72,6 +79,9 @@ impl Gpu {
         }
         if caps.robustness.image.is_some() {
             info = info.push_next(&mut image);
+        }
+        if whole {
+            info = info.push_next(&mut atomics);
         }
         // SAFETY: all that `info` names was found on this physical device, and lives until the call returns.
         let raw = unsafe { instance.raw.create_device(caps.physical, &info, None) }.map_err(refused)?;

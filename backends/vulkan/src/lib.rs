@@ -5,7 +5,7 @@
 //! count, and to run under validation. What decides bytes (shaders, packing, order of draws) is shared with the wgpu backend,
 //! so that both give the same pictures on the same device.
 //!
-//! The arrows inside: `backend` on top; `frame`, `blocks`, `readback` carry out; `draw`, `record`, `staging`, `submit`,
+//! The arrows inside: `backend` on top; `frame`, `warp`, `blocks`, `readback` carry out; `draw`, `compute`, `record`, `staging`, `submit`,
 //! `queries`, `descriptors`, `pipelines`, `textures`, `targets` wrap one Vulkan concept each; `memory`, `gpu`, `choose`,
 //! `instance` are the device. Everything made from the device holds it, so it is destroyed last; every submission is waited
 //! for, so what one used may be destroyed once the call returns.
@@ -15,6 +15,7 @@
 mod backend;
 mod blocks;
 mod choose;
+mod compute;
 mod descriptors;
 mod draw;
 mod frame;
@@ -29,6 +30,7 @@ mod staging;
 mod submit;
 mod targets;
 mod textures;
+mod warp;
 
 pub use backend::{Options, VulkanBackend, available};
 pub use choose::Without;

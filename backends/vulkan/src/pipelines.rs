@@ -1,4 +1,5 @@
-//! Pipelines: the shared shaders as SPIR-V, dynamic rendering, one pipeline a shader and way of culling.
+//! Pipelines: the shared shaders as SPIR-V, dynamic rendering, one pipeline a shader and way of culling. Of the two shaders that
+//! warp layered depth images only the one that the device is to use is made.
 //!
 //! State as wgpu-hal sets it: front faces counter-clockwise under a viewport of negative height, reversed depth that passes
 //! where greater, no blending.
@@ -11,7 +12,8 @@ use farfield_core::Fault;
 use farfield_shaders::layout::{AttributeFormat, vertex_layout};
 use farfield_shaders::records::Cull;
 use farfield_shaders::spirv::{Stage, compile};
-use farfield_shaders::{FRAGMENT_ENTRY, Shader, VERTEX_ENTRY};
+use farfield_shaders::warp::Atomics;
+use farfield_shaders::{COMPUTE_ENTRY, FRAGMENT_ENTRY, Shader, VERTEX_ENTRY};
 
 use crate::descriptors::SetLayouts;
 use crate::gpu::Gpu;
@@ -34,16 +36,25 @@ impl Pipelines {
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self, Fault> {
         let sets = SetLayouts::new(gpu)?;
         let mut all = Self { gpu: gpu.clone(), layouts: BTreeMap::new(), made: BTreeMap::new(), sets };
-        for shader in Shader::ALL {
+        let other = match gpu.caps.atomics {
+            Atomics::Whole => Atomics::Halves,
+            Atomics::Halves => Atomics::Whole,
+        };
+        for shader in Shader::ALL.into_iter().filter(|&s| s != other.shader()) {
             let set_layouts = all.sets.of(shader);
             let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts);
             // SAFETY: the set layouts are of this device and live.
             let layout =
                 unsafe { gpu.raw.create_pipeline_layout(&info, None) }.map_err(|e| gpu.fault("pipeline layout", e))?;
             all.layouts.insert(shader, layout);
+            if shader.stages() == [Stage::Compute] {
+                let pipeline = compute(gpu, shader, layout)?;
+                all.made.insert((shader, Cull::None), pipeline);
+                continue;
+            }
             let vertex = Module::new(gpu, shader, Stage::Vertex)?;
             let fragment = Module::new(gpu, shader, Stage::Fragment)?;
-            let ways: &[Cull] = if shader == Shader::Shade { &[Cull::None] } else { &[Cull::None, Cull::Back] };
+            let ways: &[Cull] = if shader.vertices().is_some() { &[Cull::None, Cull::Back] } else { &[Cull::None] };
             for &cull in ways {
                 let pipeline = pipeline(gpu, shader, cull, layout, &vertex, &fragment)?;
                 all.made.insert((shader, cull), pipeline);
@@ -95,6 +106,32 @@ impl Drop for Module<'_> {
         // SAFETY: made from this device, destroyed once; pipelines do not need their modules.
         unsafe { self.gpu.raw.destroy_shader_module(self.raw, None) };
     }
+}
+
+fn compute(gpu: &Gpu, shader: Shader, layout: vk::PipelineLayout) -> Result<vk::Pipeline, Fault> {
+    let module = Module::new(gpu, shader, Stage::Compute)?;
+    let name = std::ffi::CString::new(COMPUTE_ENTRY).map_err(|e| gpu.fault("entry point", e))?;
+    let stage = vk::PipelineShaderStageCreateInfo::default()
+        .stage(vk::ShaderStageFlags::COMPUTE)
+        .module(module.raw)
+        .name(&name);
+    let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
+    // SAFETY: all that `info` points to lives until the call returns.
+    let made = unsafe { gpu.raw.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
+    one(gpu, shader, made)
+}
+
+/// The pipeline of a call that makes one.
+fn one(
+    gpu: &Gpu,
+    shader: Shader,
+    made: Result<Vec<vk::Pipeline>, (Vec<vk::Pipeline>, vk::Result)>,
+) -> Result<vk::Pipeline, Fault> {
+    made.map(|p| p[0]).map_err(|(partial, e)| {
+        // SAFETY: a pipeline of a failed call is null, which is allowed, or unused.
+        partial.into_iter().for_each(|p| unsafe { gpu.raw.destroy_pipeline(p, None) });
+        gpu.fault(&format!("the pipeline for {}", shader.label()), e)
+    })
 }
 
 fn pipeline(
@@ -171,9 +208,5 @@ fn pipeline(
     // SAFETY: all that `info` points to lives until the call returns; the device has dynamic rendering, so no render pass is
     // named.
     let made = unsafe { gpu.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
-    made.map(|p| p[0]).map_err(|(partial, e)| {
-        // SAFETY: a pipeline of a failed call is null, which is allowed, or unused.
-        partial.into_iter().for_each(|p| unsafe { gpu.raw.destroy_pipeline(p, None) });
-        gpu.fault(&format!("the pipeline for {}", shader.label()), e)
-    })
+    one(gpu, shader, made)
 }

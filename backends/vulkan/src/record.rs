@@ -1,4 +1,5 @@
-//! Recording: barriers and copies, each a plain call. Draws are recorded in [`crate::draw`].
+//! Recording: barriers and copies, each a plain call. Draws are recorded in [`crate::draw`], compute in
+//! [`crate::compute`].
 //!
 //! Barriers are explicit (synchronization2), each naming what came before and what comes after.
 
@@ -64,13 +65,31 @@ impl Use {
         ),
         vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL,
     );
-    /// Buffers as draws read them: vertices, indices, indirect records, shader data.
+    /// A buffer that is filled.
+    pub(crate) const FILLED: Self =
+        Self::new(vk::PipelineStageFlags2::ALL_TRANSFER, vk::AccessFlags2::TRANSFER_WRITE, vk::ImageLayout::UNDEFINED);
+    /// Buffers that compute shaders read and write.
+    pub(crate) const COMPUTED: Self = Self::new(
+        vk::PipelineStageFlags2::COMPUTE_SHADER,
+        vk::AccessFlags2::from_raw(
+            vk::AccessFlags2::SHADER_STORAGE_READ.as_raw() | vk::AccessFlags2::SHADER_STORAGE_WRITE.as_raw(),
+        ),
+        vk::ImageLayout::UNDEFINED,
+    );
+    /// Buffers that fragment shaders read.
+    pub(crate) const LOADED: Self = Self::new(
+        vk::PipelineStageFlags2::FRAGMENT_SHADER,
+        vk::AccessFlags2::SHADER_STORAGE_READ,
+        vk::ImageLayout::UNDEFINED,
+    );
+    /// Buffers as draws and what computes read them: vertices, indices, indirect records, shader data.
     pub(crate) const DRAWN: Self = Self::new(
         vk::PipelineStageFlags2::from_raw(
             vk::PipelineStageFlags2::VERTEX_INPUT.as_raw()
                 | vk::PipelineStageFlags2::DRAW_INDIRECT.as_raw()
                 | vk::PipelineStageFlags2::VERTEX_SHADER.as_raw()
-                | vk::PipelineStageFlags2::FRAGMENT_SHADER.as_raw(),
+                | vk::PipelineStageFlags2::FRAGMENT_SHADER.as_raw()
+                | vk::PipelineStageFlags2::COMPUTE_SHADER.as_raw(),
         ),
         vk::AccessFlags2::from_raw(
             vk::AccessFlags2::VERTEX_ATTRIBUTE_READ.as_raw()

@@ -138,12 +138,12 @@ fn a_device_that_lacks_something_does_the_same_and_says_so() {
         (counted, backend.read_surface(TargetId(0)).unwrap(), backend.read_picture(TargetId(1)).unwrap())
     };
     let Some(mut whole) = opened(TEST, &scene) else { return };
-    let without = Without { indirect: true, timestamps: true, statistics: true };
+    let without = Without { indirect: true, timestamps: true, statistics: true, atomics_64: true };
     let Some(mut bare) = opened_without(TEST, &scene, without) else { return };
     let (a, b) = (shown(&mut whole), shown(&mut bare));
     assert_eq!((&a.1, &a.2), (&b.1, &b.2));
     assert_eq!((b.0.gpu_ms, b.0.clipped_primitives, b.0.near_triangles), (None, None, a.0.near_triangles));
-    for what in ["timestamps", "statistics", "multi-draw-indirect"] {
+    for what in ["timestamps", "statistics", "multi-draw-indirect", "64-bit atomics"] {
         assert!(bare.info().degraded.iter().any(|d| d.contains(what)), "{what}: {:?}", bare.info().degraded);
     }
     ends_silently(whole);

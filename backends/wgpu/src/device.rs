@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use farfield_core::Fault;
 use farfield_core::backend::DeviceInfo;
+use farfield_shaders::warp::Atomics;
 use wgpu::Features;
 
 /// Which adapter, and how closely it is watched.
@@ -28,6 +29,8 @@ pub struct Without {
     pub timestamps: bool,
     /// No primitives are counted.
     pub statistics: bool,
+    /// Layered depth images are warped by 32-bit atomics, in two phases.
+    pub atomics_64: bool,
 }
 
 /// The first thing a device complained about since it was last asked.
@@ -55,6 +58,7 @@ pub(crate) struct Gpu {
     pub(crate) indirect: bool,
     pub(crate) timestamps: bool,
     pub(crate) statistics: bool,
+    pub(crate) atomics: Atomics,
     complaints: Complaints,
 }
 
@@ -139,6 +143,9 @@ impl Gpu {
             options.without.statistics,
             "no pipeline statistics: clipped primitives are not counted",
         );
+        let whole = Features::SHADER_INT64 | Features::SHADER_INT64_ATOMIC_MIN_MAX;
+        let whole = ask(whole, options.without.atomics_64, Atomics::LACKING);
+        let atomics = if whole { Atomics::Whole } else { Atomics::Halves };
         let limits = adapter.limits();
         let device_name = format!("{} ({} {})", about.name, about.driver, about.driver_info);
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
@@ -158,7 +165,7 @@ impl Gpu {
             }
         });
         let info = DeviceInfo { backend: "wgpu".into(), device: device_name, degraded };
-        Ok(Self { device, queue, info, limits, indirect, timestamps, statistics, complaints })
+        Ok(Self { device, queue, info, limits, indirect, timestamps, statistics, atomics, complaints })
     }
 
     pub(crate) fn fault(&self, cause: impl Into<String>) -> Fault {

@@ -1,7 +1,6 @@
 //! Plans as commands, and the counters around them.
 
 use farfield_core::Fault;
-use farfield_shaders::Shader;
 use farfield_shaders::layout::{DrawCommand, ShadeUniform, UNIFORM_ALIGN, ViewUniform};
 use farfield_shaders::plan::{Batch, FramePlan, PassPlan, Work};
 use farfield_shaders::pool::Stream;
@@ -62,6 +61,8 @@ pub(crate) struct Queries {
     /// For each pass the number of its count.
     count_of: Vec<Option<u32>>,
     surfaces: u32,
+    /// For each pass whether it starts with compute.
+    started: Vec<bool>,
     resolved: wgpu::Buffer,
     readable: wgpu::Buffer,
 }
@@ -88,7 +89,8 @@ impl Queries {
         let size = Self::counts_at(passes) + 8 * u64::from(surfaces);
         let resolved = gpu.buffer("queries", size, BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC)?;
         let readable = gpu.buffer("queries read", size, BufferUsages::COPY_DST | BufferUsages::MAP_READ)?;
-        Ok(Self { times, counts, passes, count_of, surfaces, resolved, readable })
+        let started = plan.passes.iter().map(|p| !p.layered.is_empty()).collect();
+        Ok(Self { times, counts, passes, count_of, surfaces, started, resolved, readable })
     }
 
     /// Where the counts start, bytes.
@@ -99,8 +101,18 @@ impl Queries {
     fn timestamps(&self, pass: usize) -> Option<wgpu::RenderPassTimestampWrites<'_>> {
         self.times.as_ref().map(|query_set| wgpu::RenderPassTimestampWrites {
             query_set,
-            beginning_of_pass_write_index: Some(2 * pass as u32),
+            // Where compute comes before, it took the time.
+            beginning_of_pass_write_index: (!self.started[pass]).then_some(2 * pass as u32),
             end_of_pass_write_index: Some(2 * pass as u32 + 1),
+        })
+    }
+
+    /// The first timestamp of a pass that starts with compute.
+    pub(crate) fn start(&self, pass: usize) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
+        self.times.as_ref().map(|query_set| wgpu::ComputePassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: Some(2 * pass as u32),
+            end_of_pass_write_index: None,
         })
     }
 
@@ -164,6 +176,8 @@ impl WgpuBackend {
                 wgpu::BindGroupEntry { binding: 0, resource: uniform(&frame.uniforms, size_of::<ShadeUniform>()) };
             frame.shade = Some(group("shade", &self.pipelines.shade, &[entry]));
         }
+        let samples = &self.pages[Stream::Samples as usize];
+        self.splats.prepare(gpu, &self.pipelines, &frame.uniforms, samples, plan)?;
         for pass in &plan.passes {
             if let Work::Surface(batches) = &pass.work {
                 for b in batches {
@@ -175,7 +189,7 @@ impl WgpuBackend {
         gpu.check()
     }
 
-    /// A surface pass into the top left of a target that is at least as large.
+    /// A surface pass into the top left of a target that is at least as large, and the compute before it.
     pub(crate) fn surface_pass(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -185,6 +199,9 @@ impl WgpuBackend {
         target: &Surface,
         queries: Option<(&Queries, usize)>,
     ) {
+        if !pass.layered.is_empty() {
+            self.warp(encoder, pass, queries);
+        }
         let attachment = |view| {
             Some(wgpu::RenderPassColorAttachment {
                 view,
@@ -218,17 +235,14 @@ impl WgpuBackend {
         for b in batches {
             self.batch(&mut rp, plan, b);
         }
+        self.resolve(&mut rp, pass);
         if counts.is_some() {
             rp.end_pipeline_statistics_query();
         }
     }
 
     fn batch(&self, rp: &mut wgpu::RenderPass<'_>, plan: &FramePlan, b: &Batch) {
-        let stream = match b.key.shader {
-            Shader::Mesh => Stream::MeshVertices,
-            Shader::Projected => Stream::ProjectedVertices,
-            Shader::Chunk | Shader::Shade => Stream::ChunkVertices,
-        };
+        let Some(stream) = b.key.shader.vertices() else { return };
         let commands = &plan.commands[b.commands.start as usize..b.commands.end as usize];
         let (Some(pipeline), Some(vertices), Some(indices)) = (
             self.pipelines.surface(b.key.shader, b.key.cull),

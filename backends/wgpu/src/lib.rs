@@ -8,7 +8,8 @@
 //! work without a layer between.
 //!
 //! Limits: a projected part draws from at most four atlases; the records of a frame (128 bytes a placed chunk) fit in one
-//! storage binding; pages of buffers are not given back before the backend is dropped.
+//! storage binding, as do the samples of a layered depth image and the splats of a pass (8 bytes a pixel); pages of buffers are not
+//! given back before the backend is dropped.
 
 mod device;
 mod encode;
@@ -16,6 +17,7 @@ mod pipelines;
 mod read;
 mod targets;
 mod textures;
+mod warp;
 
 use std::time::Instant;
 
@@ -39,6 +41,7 @@ use encode::FrameBuffers;
 use pipelines::Pipelines;
 use targets::{Kept, Shaded, Surface};
 use textures::Textures;
+use warp::Splats;
 
 /// Bytes on their way to the device before a submission is forced, so that staging memory stays bounded.
 const UPLOAD_BATCH_BYTES: u64 = 64 << 20;
@@ -51,8 +54,9 @@ pub struct WgpuBackend {
     textures: Textures,
     residency: Residency,
     /// Buffers by stream and page.
-    pages: [Vec<wgpu::Buffer>; 5],
+    pages: [Vec<wgpu::Buffer>; Stream::ALL.len()],
     frame: FrameBuffers,
+    splats: Splats,
     surfaces: Kept<Surface>,
     pictures: Kept<Shaded>,
     /// Targets of captures, by size.
@@ -68,10 +72,11 @@ impl WgpuBackend {
     /// [`Fault::Device`] where no adapter fits the options or the device fails, [`Fault::Data`] where a texture is unsound.
     pub fn new(scene: &Scene, options: &Options) -> Result<Self, Fault> {
         let gpu = Gpu::open(options)?;
-        let pipelines = Pipelines::new(&gpu.device);
+        let pipelines = Pipelines::new(&gpu.device, gpu.atomics);
         gpu.check()?;
         let textures = Textures::new(&gpu, &pipelines, scene)?;
         let frame = FrameBuffers::new(&gpu)?;
+        let splats = Splats::new(&gpu)?;
         let sizes = PageSizes::for_device(gpu.limits.max_buffer_size);
         let residency = Residency::new(sizes, gpu.limits.max_storage_buffer_binding_size);
         Ok(Self {
@@ -87,6 +92,7 @@ impl WgpuBackend {
             pipelines,
             textures,
             frame,
+            splats,
         })
     }
 
@@ -117,7 +123,7 @@ impl WgpuBackend {
             let kind = match page.stream {
                 Stream::ChunkVertices | Stream::MeshVertices | Stream::ProjectedVertices => wgpu::BufferUsages::VERTEX,
                 Stream::Indices => wgpu::BufferUsages::INDEX,
-                Stream::Projectors => wgpu::BufferUsages::STORAGE,
+                Stream::Projectors | Stream::Samples => wgpu::BufferUsages::STORAGE,
             };
             let buffer = self.gpu.buffer("page", *bytes, kind | wgpu::BufferUsages::COPY_DST)?;
             self.pages[page.stream as usize].push(buffer);
@@ -213,8 +219,8 @@ impl Backend for WgpuBackend {
             Some(q) => q.results(&self.gpu)?,
             None => (None, None),
         };
-        let (near_triangles, far_triangles) = (plan.near_triangles, plan.far_triangles);
-        Ok(Counted { gpu_ms, wall_ms, near_triangles, far_triangles, samples: 0, clipped_primitives })
+        let (near_triangles, far_triangles, samples) = (plan.near_triangles, plan.far_triangles, plan.samples);
+        Ok(Counted { gpu_ms, wall_ms, near_triangles, far_triangles, samples, clipped_primitives })
     }
 
     fn read_surface(&mut self, target: TargetId) -> Result<SurfaceImage, Fault> {

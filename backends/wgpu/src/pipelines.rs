@@ -1,8 +1,12 @@
 //! Pipelines and bind group layouts, as the shared shaders want them.
 
-use farfield_shaders::layout::{ATLAS_SLOTS, AttributeFormat, Record, ShadeUniform, ViewUniform, vertex_layout};
+use farfield_shaders::layout::{
+    ATLAS_SLOTS, AttributeFormat, GpuProjector, GpuSample, Record, ShadeUniform, ViewUniform, WarpUniform,
+    vertex_layout,
+};
 use farfield_shaders::records::Cull;
-use farfield_shaders::{FRAGMENT_ENTRY, Shader, VERTEX_ENTRY};
+use farfield_shaders::warp::{Atomics, SPLAT_BYTES};
+use farfield_shaders::{COMPUTE_ENTRY, FRAGMENT_ENTRY, Shader, VERTEX_ENTRY};
 use wgpu::{BindingType, BufferBindingType, ShaderStages, TextureFormat, TextureSampleType, TextureViewDimension};
 
 /// The colour planes of a surface target: albedo, normal, linear depth, object.
@@ -26,9 +30,17 @@ pub(crate) struct Pipelines {
     pub(crate) shade: wgpu::BindGroupLayout,
     /// Group 1 of shading passes.
     pub(crate) planes: wgpu::BindGroupLayout,
+    /// Group 0 of the warp.
+    pub(crate) warped: wgpu::BindGroupLayout,
+    /// Group 0 of what resolves it.
+    pub(crate) resolved: wgpu::BindGroupLayout,
     surfaces: Vec<((Shader, Cull), wgpu::RenderPipeline)>,
     /// The shading pass.
     pub(crate) shading: wgpu::RenderPipeline,
+    /// Throws the samples of layered depth images.
+    pub(crate) warp: wgpu::ComputePipeline,
+    /// Composes them.
+    pub(crate) resolve: wgpu::RenderPipeline,
 }
 
 fn entry(binding: u32, visibility: ShaderStages, ty: BindingType) -> wgpu::BindGroupLayoutEntry {
@@ -41,12 +53,12 @@ fn uniform(size: usize) -> BindingType {
 }
 
 fn storage(size: usize) -> BindingType {
+    buffer(size, true)
+}
+
+fn buffer(size: usize, read_only: bool) -> BindingType {
     let min_binding_size = std::num::NonZeroU64::new(size as u64);
-    BindingType::Buffer {
-        ty: BufferBindingType::Storage { read_only: true },
-        has_dynamic_offset: false,
-        min_binding_size,
-    }
+    BindingType::Buffer { ty: BufferBindingType::Storage { read_only }, has_dynamic_offset: false, min_binding_size }
 }
 
 fn sampled(sample_type: TextureSampleType, view_dimension: TextureViewDimension) -> BindingType {
@@ -54,7 +66,7 @@ fn sampled(sample_type: TextureSampleType, view_dimension: TextureViewDimension)
 }
 
 impl Pipelines {
-    pub(crate) fn new(device: &wgpu::Device) -> Self {
+    pub(crate) fn new(device: &wgpu::Device, atomics: Atomics) -> Self {
         let both = ShaderStages::VERTEX | ShaderStages::FRAGMENT;
         let fragment = ShaderStages::FRAGMENT;
         let group = |label: &str, entries: &[wgpu::BindGroupLayoutEntry]| {
@@ -70,7 +82,7 @@ impl Pipelines {
             "texture",
             &[entry(0, fragment, sampled(filtered, TextureViewDimension::D2)), entry(1, fragment, filtering)],
         );
-        let projectors = storage(size_of::<farfield_shaders::layout::GpuProjector>());
+        let projectors = storage(size_of::<GpuProjector>());
         let mut entries = vec![entry(0, fragment, projectors), entry(1, fragment, filtering)];
         let layers = sampled(filtered, TextureViewDimension::D2Array);
         entries.extend((0..2 * ATLAS_SLOTS as u32).map(|i| entry(2 + i, fragment, layers)));
@@ -83,6 +95,17 @@ impl Pipelines {
             &[0, 1, 2, 3].map(|i| entry(i, fragment, sampled(kinds[i as usize], TextureViewDimension::D2))),
         );
 
+        let samples = |label, stage, read_only| {
+            let entries = [
+                entry(0, stage, uniform(size_of::<WarpUniform>())),
+                entry(1, stage, storage(size_of::<GpuSample>())),
+                entry(2, stage, buffer(SPLAT_BYTES as usize, read_only)),
+            ];
+            group(label, &entries)
+        };
+        let warped = samples("warped samples", ShaderStages::COMPUTE, false);
+        let resolved = samples("resolved samples", fragment, true);
+
         let mut surfaces = vec![];
         for (shader, group_1) in
             [(Shader::Chunk, Some(&texture)), (Shader::Mesh, None), (Shader::Projected, Some(&atlases))]
@@ -93,13 +116,41 @@ impl Pipelines {
             }
         }
         let shading = pipeline(device, Shader::Shade, Cull::None, &[Some(&shade), Some(&planes)], &[PICTURE]);
-        Self { view, texture, atlases, shade, planes, surfaces, shading }
+        let warp = compute(device, atomics.shader(), &warped);
+        let resolve = pipeline(device, Shader::Resolve, Cull::None, &[Some(&resolved)], &PLANES);
+        Self { view, texture, atlases, shade, planes, warped, resolved, surfaces, shading, warp, resolve }
     }
 
     /// The pipeline of a surface batch.
     pub(crate) fn surface(&self, shader: Shader, cull: Cull) -> Option<&wgpu::RenderPipeline> {
         self.surfaces.iter().find(|(k, _)| *k == (shader, cull)).map(|(_, p)| p)
     }
+}
+
+fn module(device: &wgpu::Device, shader: Shader) -> wgpu::ShaderModule {
+    device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(shader.label()),
+        source: wgpu::ShaderSource::Wgsl(shader.wgsl().into()),
+    })
+}
+
+fn layout(device: &wgpu::Device, shader: Shader, groups: &[Option<&wgpu::BindGroupLayout>]) -> wgpu::PipelineLayout {
+    device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(shader.label()),
+        bind_group_layouts: groups,
+        immediate_size: 0,
+    })
+}
+
+fn compute(device: &wgpu::Device, shader: Shader, group: &wgpu::BindGroupLayout) -> wgpu::ComputePipeline {
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(shader.label()),
+        layout: Some(&layout(device, shader, &[Some(group)])),
+        module: &module(device, shader),
+        entry_point: Some(COMPUTE_ENTRY),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        cache: None,
+    })
 }
 
 fn pipeline(
@@ -110,15 +161,7 @@ fn pipeline(
     targets: &[TextureFormat],
 ) -> wgpu::RenderPipeline {
     let label = Some(shader.label());
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label,
-        source: wgpu::ShaderSource::Wgsl(shader.wgsl().into()),
-    });
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label,
-        bind_group_layouts: groups,
-        immediate_size: 0,
-    });
+    let (module, layout) = (module(device, shader), layout(device, shader, groups));
     let (stride, attributes) = vertex_layout(shader);
     let attributes: Vec<wgpu::VertexAttribute> = attributes
         .iter()
@@ -147,7 +190,7 @@ fn pipeline(
         stencil: wgpu::StencilState::default(),
         bias: wgpu::DepthBiasState::default(),
     };
-    let draws = shader != Shader::Shade;
+    let surface = shader != Shader::Shade;
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label,
         layout: Some(&layout),
@@ -155,13 +198,13 @@ fn pipeline(
             module: &module,
             entry_point: Some(VERTEX_ENTRY),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
-            buffers: if draws { &buffers } else { &[] },
+            buffers: if shader.vertices().is_some() { &buffers } else { &[] },
         },
         primitive: wgpu::PrimitiveState {
             cull_mode: (cull == Cull::Back).then_some(wgpu::Face::Back),
             ..Default::default()
         },
-        depth_stencil: draws.then_some(depth),
+        depth_stencil: surface.then_some(depth),
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {
             module: &module,

@@ -1,7 +1,13 @@
-// What all shaders share: octahedral normals and sRGB. The same arithmetic as farfield-core's image.rs and color.rs.
+// What all shaders share: directions, octahedral normals and sRGB. The same arithmetic as farfield-core's image.rs and color.rs.
 
 fn sign_not_zero(v: vec2<f32>) -> vec2<f32> {
     return select(vec2<f32>(-1.0), vec2<f32>(1.0), v >= vec2<f32>(0.0));
+}
+
+// The unit vector; 0 where there is none.
+fn direction(v: vec3<f32>) -> vec3<f32> {
+    let reciprocal = 1.0 / length(v);
+    return select(vec3<f32>(0.0), v * reciprocal, reciprocal > 0.0 && reciprocal < 3.0e38);
 }
 
 // Two 16-bit signed fractions, x in the low half; up where the vector has no direction.

@@ -67,11 +67,6 @@ fn vertex(
     );
 }
 
-fn direction(v: vec3<f32>) -> vec3<f32> {
-    let reciprocal = 1.0 / length(v);
-    return select(vec3<f32>(0.0), v * reciprocal, reciprocal > 0.0 && reciprocal < 3.0e38);
-}
-
 fn look_up(index: u32, point: vec3<f32>) -> Texel {
     let q = projectors[index].matrix * vec4<f32>(point, 1.0);
     let at = clamp(q.xy / q.w, projectors[index].low, projectors[index].high);

@@ -31,13 +31,6 @@ struct Shade {
 @group(1) @binding(2) var depth_plane: texture_2d<f32>;
 @group(1) @binding(3) var object_plane: texture_2d<u32>;
 
-// One triangle over the whole picture.
-@vertex
-fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
-    let corner = vec2<f32>(f32(index & 1u), f32(index >> 1u)) * 4.0 - 1.0;
-    return vec4<f32>(corner, 0.0, 1.0);
-}
-
 @fragment
 fn fragment(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
     let pixel = vec2<i32>(at.xy);

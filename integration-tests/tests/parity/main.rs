@@ -7,6 +7,8 @@
 //!
 //! `benches/frame_times.rs` prints frame times of both.
 
+mod layered;
+
 use std::collections::BTreeSet;
 
 use farfield_core::backend::{Backend, BlockData};
