@@ -9,6 +9,8 @@
 //! Samples are kept as they are stored: depth in 16 bits, evenly spaced in 1 / depth, so that what rounding moves on screen is bounded
 //! ([`LayeredPart::rounding_px`]); normals as octahedral pairs of bytes. 10 bytes a sample and one a pixel.
 
+mod stored;
+
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +25,7 @@ pub const MAX_SPLAT_PX: f32 = 8.0;
 
 /// A layered depth image. The samples of a pixel follow each other from front to back; pixels run by rows from the top.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(into = "stored::Stored", try_from = "stored::Stored")]
 pub struct LayeredPart {
     /// Its camera; the eye is relative to the payload's origin.
     pub camera: Camera,
