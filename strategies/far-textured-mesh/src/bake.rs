@@ -1,9 +1,12 @@
 //! One cell: its pieces in parallel, then atlases, payloads, claims and the index in a fixed order.
 
+use std::collections::BTreeMap;
+
 use farfield_core::claim::{Claim, Quantity};
 use farfield_core::context::{Context, collect};
-use farfield_core::id::LocalPayload;
+use farfield_core::id::{ChunkId, LocalPayload, ObjectId};
 use farfield_core::payload::{Part, Payload, ProjectedPart, Projector};
+use farfield_core::scene::ChunkSet;
 use farfield_core::strategy::{CellJob, LeftOut, Sink};
 use farfield_core::{Aabb, Camera, Fault};
 use glam::{Mat4, Vec3};
@@ -25,13 +28,8 @@ pub(crate) fn bake(
     out: &dyn Sink,
     cx: &Context<'_>,
 ) -> Result<Vec<u8>, Fault> {
-    let mut work: Vec<(u32, Piece)> = vec![];
-    let mut index = Index::default();
-    for (split, s) in job.cell.splits.iter().enumerate() {
-        let (found, plain) = pieces(job.scene, &s.far, job.cell.outline.centre, job.views.near);
-        work.extend(found.into_iter().map(|p| (split as u32, p)));
-        index.plain.push(plain);
-    }
+    let (work, plain) = of_splits(job);
+    let mut index = Index { plain, ..Index::default() };
     let mut baked = collect(cx.run, work.len(), &|i| simplify(own, job, &work[i].1, cx))?;
     report(&baked, &index, out);
 
@@ -62,7 +60,7 @@ pub(crate) fn bake(
 
     for (i, b) in baked.into_iter().enumerate() {
         let Some(b) = b else { continue };
-        let (split, piece) = &work[i];
+        let (splits, piece) = &work[i];
         let slots = &packing.slots[i];
         let projectors: Vec<Projector> = b
             .views
@@ -76,26 +74,49 @@ pub(crate) fn bake(
         if let Some(max) = hole_px {
             out.claim(Claim { quantity: Quantity::HoleWidthPx, payload: Some(id), max });
         }
-        let shows = |k: &u32| {
-            let s = &job.cell.sectors[*k as usize];
-            s.split.0 == *split && !s.seen.intersection(&piece.chunks).is_empty()
-        };
-        let sectors = (0..job.cell.sectors.len() as u32).filter(shows).collect();
-        index.meshes.push(Entry {
-            payload: id.0,
-            parts: payload.parts.len() as u16,
-            object: piece.object.0,
-            split: *split,
-            sectors,
-            bounds: payload.bounds,
-            bytes: mesh_bytes(&payload),
-            error_px,
-            size_px,
-            atlas: slots.first().map(|s| s.atlas),
-        });
+        for &split in splits {
+            let shows = |k: &u32| {
+                let s = &job.cell.sectors[*k as usize];
+                s.split.0 == split && !s.seen.intersection(&piece.chunks).is_empty()
+            };
+            index.meshes.push(Entry {
+                payload: id.0,
+                parts: payload.parts.len() as u16,
+                object: piece.object.0,
+                split,
+                sectors: (0..job.cell.sectors.len() as u32).filter(shows).collect(),
+                bounds: payload.bounds,
+                bytes: mesh_bytes(&payload),
+                error_px,
+                size_px,
+                atlas: slots.first().map(|s| s.atlas),
+            });
+        }
         out.put(id, &payload)?;
     }
     index.encode()
+}
+
+/// The pieces of all splits, each with the splits that it is far in, and what no picture holds, split by split. Splits that leave
+/// the same chunks of an object far share the piece: what is baked of it depends on the cell, not on the split.
+fn of_splits(job: &CellJob<'_>) -> (Vec<(Vec<u32>, Piece)>, Vec<ChunkSet>) {
+    let (mut work, mut all_plain): (Vec<(Vec<u32>, Piece)>, _) = (vec![], vec![]);
+    let mut known: BTreeMap<(ObjectId, Option<ChunkId>), Vec<usize>> = BTreeMap::new();
+    for (split, s) in job.cell.splits.iter().enumerate() {
+        let (found, plain) = pieces(job.scene, &s.far, job.cell.outline.centre, job.views.near);
+        for piece in found {
+            let alike = known.entry((piece.object, piece.chunks.iter().next())).or_default();
+            match alike.iter().find(|&&i| work[i].1.chunks == piece.chunks) {
+                Some(&i) => work[i].0.push(split as u32),
+                None => {
+                    alike.push(work.len());
+                    work.push((vec![split as u32], piece));
+                }
+            }
+        }
+        all_plain.push(plain);
+    }
+    (work, all_plain)
 }
 
 /// Says what the cell turned out not to need.

@@ -43,8 +43,9 @@ impl FarView for TexturedView {
     fn wanted(&self, view: &View<'_>, out: &mut Vec<Candidate>) {
         let mut used = vec![(false, 0f32); self.index.atlases.len()];
         let first = out.len();
-        for entry in &self.index.meshes {
-            let in_view = in_view(entry, view);
+        // Entries of one payload, one a split that shares it, follow each other.
+        for entries in self.index.meshes.chunk_by(|a, b| a.payload == b.payload) {
+            let (entry, in_view) = (&entries[0], entries.iter().any(|e| in_view(e, view)));
             if let Some(a) = entry.atlas {
                 let (seen, px) = &mut used[a as usize];
                 (*seen, *px) = (*seen || in_view, px.max(entry.size_px));
