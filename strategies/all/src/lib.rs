@@ -7,15 +7,26 @@
 use farfield_core::registry::{Entry, Kind, settings_of};
 
 pub use {
-    farfield_far_baselines as far_baselines, farfield_far_textured_mesh as far_textured_mesh,
-    farfield_metrics as metrics, farfield_partition_hex as partition_hex,
-    farfield_partition_single_cell as partition_single_cell, farfield_schedulers as schedulers,
+    farfield_far_baselines as far_baselines, farfield_far_ldi as far_ldi,
+    farfield_far_textured_mesh as far_textured_mesh, farfield_metrics as metrics,
+    farfield_partition_hex as partition_hex, farfield_partition_single_cell as partition_single_cell,
+    farfield_schedulers as schedulers,
 };
 
 /// The paper of the textured LOD meshes, before a section's number.
 macro_rules! textured {
     ($section:literal) => {
         concat!("Textured LOD meshes (Chen, Lin, Chen, Chuang 2003), section ", $section)
+    };
+}
+
+/// The paper of image placement, before a section's number.
+macro_rules! placement {
+    ($section:literal) => {
+        concat!(
+            "Automatic image placement to provide a guaranteed frame rate (Aliaga, Lastra 1999), section ",
+            $section
+        )
     };
 }
 
@@ -28,6 +39,13 @@ pub fn registry() -> Vec<Entry> {
             summary: "No far field: all geometry, or what frustum culling leaves of it",
             source: textured!("4, configurations A and B"),
             settings: settings_of::<far_baselines::AllGeometry>(),
+        },
+        Entry {
+            kind: Kind::FarField,
+            name: "layered-depth-image",
+            summary: "What is far as pictures with several samples a pixel, warped to the eye",
+            source: placement!("4"),
+            settings: settings_of::<far_ldi::LayeredDepthImage>(),
         },
         Entry {
             kind: Kind::FarField,
@@ -56,6 +74,13 @@ pub fn registry() -> Vec<Entry> {
             summary: "Fetches what the active cell wants when it is entered, frees the rest",
             source: "farfield; the baseline without prefetching",
             settings: settings_of::<schedulers::LoadOnEntry>(),
+        },
+        Entry {
+            kind: Kind::Scheduler,
+            name: "near-to-far-lru",
+            summary: "Fetches what stands within a radius near to far, frees what was used longest ago",
+            source: placement!("5"),
+            settings: settings_of::<schedulers::NearToFarLru>(),
         },
         Entry {
             kind: Kind::SimplificationMetric,

@@ -1,5 +1,7 @@
 //! What is resident, and when it is fetched.
 
 mod load_on_entry;
+mod near_to_far_lru;
 
 pub use load_on_entry::LoadOnEntry;
+pub use near_to_far_lru::NearToFarLru;
