@@ -22,11 +22,18 @@ const VARIANTS: [(&str, &str); 1] = [("single-cell", "region = [-8.0, 1.0, -1.0,
 const FITTED: [(&str, &str); 1] = [("textured-lod-mesh", "edge_px = 1.0")];
 
 /// Combinations that are refused: partition, far field, and what the refusal must say. All others have to run.
-const REFUSED: [(&str, &str, [&str; 3]); 1] = [(
-    "{ type = \"single-cell\" }",
-    "textured-lod-mesh",
-    ["pipeline \"tested\"", "meets the viewpoints of cell 0", "give the partition a region"],
-)];
+const REFUSED: [(&str, &str, [&str; 3]); 2] = [
+    (
+        "{ type = \"single-cell\" }",
+        "layered-depth-image",
+        ["pipeline \"tested\"", "meets the viewpoints of cell 0", "give the partition a region"],
+    ),
+    (
+        "{ type = \"single-cell\" }",
+        "textured-lod-mesh",
+        ["pipeline \"tested\"", "meets the viewpoints of cell 0", "give the partition a region"],
+    ),
+];
 
 /// PSNR of luminance against all geometry on the same backend, dB.
 const FLOOR_DB: f64 = 32.0;

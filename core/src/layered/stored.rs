@@ -2,8 +2,8 @@
 //!
 //! Samples go by layers (the first ones of all pixels, then the second ones, ...), since a surface goes on from pixel to pixel within
 //! a layer and not from sample to sample of a pixel. Depth, albedo and normals are differences from the sample before, modulo
-//! their range; each byte of a sample has a plane of its own. On a scene of pipes, at 1.05 samples a pixel covered and with zstd at its
-//! default, that is a half of what the samples as they are compress to.
+//! their range; each byte of a sample has a plane of its own. On a scene of pipes with
+//! 1.4 samples a covered pixel, and with zstd at its default, that takes 1.7 bytes a sample where the samples as they are take 2.9.
 
 use serde::{Deserialize, Serialize};
 
@@ -102,12 +102,9 @@ impl TryFrom<Stored> for LayeredPart {
             before = before.wrapping_add(word(&s.depth, i));
             (depth[to], object[to]) = (before, word(&s.object, i));
         }
-        for c in 0..3 {
-            sums(&s.albedo[c * n..][..n]).zip(&order).for_each(|(v, &to)| albedo[to][c] = v);
-        }
-        for c in 0..2 {
-            sums(&s.normal[c * n..][..n]).zip(&order).for_each(|(v, &to)| normal[to][c] = v as i8);
-        }
+        let plane = |of: &[u8], c: usize| sums(&of[c * n..][..n]).zip(order.iter().copied()).collect::<Vec<_>>();
+        (0..3).for_each(|c| plane(&s.albedo, c).into_iter().for_each(|(v, to)| albedo[to][c] = v));
+        (0..2).for_each(|c| plane(&s.normal, c).into_iter().for_each(|(v, to)| normal[to][c] = v as i8));
         Ok(Self {
             camera: s.camera,
             inverse_depth: s.inverse_depth,

@@ -228,3 +228,100 @@ fn sample(picture: &SurfaceImage, i: usize) -> Sample {
         object: picture.object[i],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use farfield_core::image::octahedral;
+
+    const EYE: Vec3 = Vec3::ZERO;
+
+    fn camera(eye: Vec3, size: u32) -> Camera {
+        Camera::looking(eye.as_dvec3(), -Vec3::Z, Vec3::Y, 1.2, [size; 2], 0.01)
+    }
+
+    /// A rectangle: a point, two edges whose cross product faces the viewer, and whose it is.
+    type Wall = (Vec3, Vec3, Vec3, u32);
+
+    /// What a camera sees of rectangles, their backs left out.
+    fn picture(c: &Camera, walls: &[Wall]) -> SurfaceImage {
+        let [w, h] = c.size;
+        let mut out = SurfaceImage { size: c.size, ..SurfaceImage::default() };
+        for i in 0..w * h {
+            let ray = c.ray((i % w) as f32 + 0.5, (i / w) as f32 + 0.5);
+            let mut hit = (f32::INFINITY, Vec3::Y, 0);
+            for &(p, a, b, object) in walls {
+                let n = a.cross(b);
+                let z = n.dot(p - c.eye.as_vec3()) / n.dot(ray);
+                let q = c.eye.as_vec3() + ray * z - p;
+                let inside = |e: Vec3| (0.0..=1.0).contains(&(q.dot(e) / e.length_squared()));
+                if n.dot(ray) < 0.0 && z > 0.0 && z < hit.0 && inside(a) && inside(b) {
+                    hit = (z, n.normalize(), object);
+                }
+            }
+            out.depth.push(hit.0);
+            out.normal.push(octahedral(hit.1));
+            out.object.push(hit.2);
+            out.albedo.push([hit.2 as u8, 0, 0, if hit.2 > 0 { 255 } else { 0 }]);
+        }
+        out
+    }
+
+    fn merged(walls: &[Wall], others: &[(Vec3, u32)]) -> Vec<Vec<Sample>> {
+        let own = camera(EYE, 64);
+        let mut layers = Layers::new(own, 1.0, &picture(&own, walls));
+        for &(eye, size) in others {
+            let c = camera(eye, size);
+            layers.add(&c, &picture(&c, walls));
+        }
+        layers.finish()
+    }
+
+    fn facing(z: f32, half: f32, object: u32) -> Wall {
+        (Vec3::new(-half, -half, z), Vec3::X * 2.0 * half, Vec3::Y * 2.0 * half, object)
+    }
+
+    #[test]
+    fn a_wall_that_many_pictures_see_is_kept_once() {
+        let others = [(Vec3::new(2.0, 1.0, -3.0), 100), (Vec3::new(-1.5, 0.3, 4.0), 37)];
+        for pixel in merged(&[facing(-10.0, 50.0, 1)], &others) {
+            assert_eq!(pixel.len(), 1);
+            assert!((pixel[0].depth - 10.0).abs() < 1e-3);
+        }
+    }
+
+    #[test]
+    fn what_another_picture_sees_behind_comes_second_without_gaps_and_nothing_comes_before_the_front() {
+        // A coarse picture from the right, which sees all of the wall that the plate hides from the centre.
+        let walls = [facing(-5.0, 1.0, 1), facing(-10.0, 50.0, 2)];
+        let pixels = merged(&walls, &[(Vec3::new(4.0, 0.0, 0.0), 40)]);
+        let central = picture(&camera(EYE, 64), &walls);
+        let row = |y: usize| -> String {
+            let of = |p: &Vec<Sample>| char::from(b'0' + p.iter().map(|s| s.object as u8).fold(0, |n, o| 4 * n + o));
+            pixels[y * 64..][..64].iter().map(of).collect()
+        };
+        // '2' is the wall alone, '6' the plate before the wall.
+        let middle = row(32);
+        let seen = middle.trim_matches('2');
+        assert_eq!(seen.len(), central.object[32 * 64..][..64].iter().filter(|o| **o == 1).count());
+        assert!(seen.len() > 10 && seen.chars().all(|c| c == '6'), "a gap in {middle}");
+        for (i, p) in pixels.iter().enumerate() {
+            assert_eq!((p[0].depth, p[0].object), (central.depth[i], central.object[i]));
+            assert!(p.iter().all(|s| s.object == 1 || (s.depth - 10.0).abs() < 1e-2));
+        }
+    }
+
+    #[test]
+    fn a_wall_that_the_centre_sees_edge_on_gets_samples_all_along() {
+        // The right side of a box, of which the centre sees the front alone.
+        let side = (Vec3::new(1.0, -1.0, -10.0), Vec3::new(0.0, 0.0, -10.0), Vec3::Y * 2.0, 2);
+        let pixels = merged(&[facing(-10.0, 1.0, 1), side], &[(Vec3::new(4.0, 0.0, -5.0), 256)]);
+        let footprint = 10.0 / camera(EYE, 64).px_per_tan();
+        let mut depths: Vec<f32> =
+            pixels[32 * 64..][..64].iter().flatten().filter(|s| s.object == 2).map(|s| s.depth).collect();
+        depths.sort_by(f32::total_cmp);
+        assert!(depths[0] < 10.0 + 3.0 * footprint && *depths.last().unwrap() > 19.0, "{depths:?}");
+        assert!(depths.windows(2).all(|w| w[1] - w[0] < 5.0 * footprint), "{depths:?} by {footprint}");
+        assert!(pixels.iter().all(|p| p.len() < 64));
+    }
+}

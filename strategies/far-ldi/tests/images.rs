@@ -195,6 +195,11 @@ fn a_bake_is_the_same_for_any_number_of_threads_and_comes_back_from_the_store() 
         assert!((packed.len() as u64) < p.texture_bytes());
     }
     assert!(one.claims.is_empty(), "nothing is promised");
+    // Smoothing is left to who draws: the samples are the same.
+    let smooth = bake(&scene, &v, &cell, "smooth = true", 2);
+    for (a, b) in one.payloads.values().zip(smooth.payloads.values()) {
+        assert!(!layered(a).smooth && *layered(b) == LayeredPart { smooth: true, ..layered(a).clone() });
+    }
 }
 
 #[test]

@@ -56,6 +56,7 @@ fn each_split_draws_its_own_and_what_they_share_is_baked_once() {
     let kept = baker.bake(&*textured(""), &cell, cells.outlines()).unwrap();
     let meshes = kept.payloads.values().filter(|p| p.triangles() > 0).count();
     assert_eq!(meshes, 3, "one an object, whatever the splits");
+    assert!(triangles(&kept) <= 3 * 8);
 
     let open = textured("").open(None, (AssetId(3), &kept.index)).unwrap();
     let camera = v.camera(cell.outline.centre.as_dvec3(), 0.0, 0.0);

@@ -1,5 +1,4 @@
 //! Baking one cell in memory and drawing it beside the scene itself.
-#![allow(dead_code, reason = "each test file uses a part")]
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
