@@ -137,12 +137,11 @@ impl Grid {
     /// The images of a point, with their axes, and which bins of its directions use which.
     fn images(&self, point: &Point, cx: &Context<'_>) -> Result<(Vec<(Placed, DVec3)>, Directions), Fault> {
         let mut images = vec![];
-        let mut views: Vec<_> = self
-            .cones
-            .iter()
-            .filter(|_| point.serves.images)
-            .map(|cone| {
-                let spans = directions::spans(&self.leaves, point.at, cone);
+        let cones = if point.serves.images { &self.cones[..] } else { &[] };
+        let mut views: Vec<_> = directions::spans(&self.leaves, point.at, cones)
+            .into_iter()
+            .zip(cones)
+            .map(|(spans, cone)| {
                 let bins = directions::bins(&self.leaves, &spans);
                 let split = vec![0u32; bins.len()];
                 (cone, spans, bins, split)

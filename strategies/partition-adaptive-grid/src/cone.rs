@@ -42,7 +42,7 @@ pub(crate) struct Cone {
 }
 
 /// A rectangle seen from above, from a point outside: azimuth of its middle, its corners' azimuths from there and distances.
-struct Seen {
+pub(crate) struct Seen {
     base: f64,
     rel: [f64; 4],
     rho: [f64; 4],
@@ -91,10 +91,17 @@ impl Cone {
         DVec3::new(-sy * cp, sp, -cy * cp)
     }
 
-    /// The yaws at which the box `lo..hi`, relative to the point, may be seen: disjoint pieces.
-    pub(crate) fn sees(&self, lo: DVec3, hi: DVec3, scratch: &mut Scratch, mut emit: impl FnMut(Arc)) {
-        if let Some(seen) = Seen::of(lo, hi)
-            && let Some(found) = self.one_arc(&seen, lo.y, hi.y)
+    /// The yaws at which the box `lo..hi`, relative to the point, may be seen: disjoint pieces. `seen` is [`Seen::of`] it.
+    pub(crate) fn sees(
+        &self,
+        lo: DVec3,
+        hi: DVec3,
+        seen: Option<&Seen>,
+        scratch: &mut Scratch,
+        mut emit: impl FnMut(Arc),
+    ) {
+        if let Some(seen) = seen
+            && let Some(found) = self.one_arc(seen, lo.y, hi.y)
         {
             if let Some((a, b)) = found {
                 arcs::outer(seen.base + a, seen.base + b, emit);
@@ -128,6 +135,12 @@ impl Cone {
 
     /// The yaws as one range from the middle of the rectangle, `Some(None)` for none; `None` where it may take more.
     fn one_arc(&self, seen: &Seen, y0: f64, y1: f64) -> Option<Option<(f64, f64)>> {
+        // Wholly above or below, at every yaw.
+        let farthest = seen.rho.into_iter().fold(0.0, f64::max);
+        let never = |p: &Plane| p.ends.iter().all(|end| p.reach(y0, y1) < -end.0 * farthest);
+        if self.planes[2..].iter().any(never) {
+            return Some(None);
+        }
         let mut now: Option<(f64, f64)> = None;
         for plane in &self.planes {
             let reach = plane.reach(y0, y1);
@@ -140,13 +153,14 @@ impl Cone {
             {
                 continue;
             }
-            let Some((mut lo, mut hi)) = seen.union(first, reach)? else { return second_only(plane) };
-            if first != second {
-                match seen.union(second, reach)? {
-                    Some((a, b)) if a <= hi && b >= lo => (lo, hi) = (lo.min(a), hi.max(b)),
-                    _ => return None,
-                }
-            }
+            let one = seen.union(first, reach)?;
+            let other = if first == second { one } else { seen.union(second, reach)? };
+            let (mut lo, mut hi) = match (one, other) {
+                (None, None) => return Some(None),
+                (Some(only), None) | (None, Some(only)) => only,
+                (Some((a, b)), Some((c, d))) if a <= d && b >= c => (a.min(c), b.max(d)),
+                _ => return None,
+            };
             if hi - lo >= TAU {
                 continue;
             }
@@ -189,11 +203,6 @@ impl Cone {
     }
 }
 
-/// No corner of the box is let in at the first end of A: none at all where there is no other end.
-fn second_only(plane: &Plane) -> Option<Option<(f64, f64)>> {
-    if plane.ends[0] == plane.ends[1] { Some(None) } else { None }
-}
-
 impl Plane {
     /// The greatest B y over the box's heights.
     fn reach(&self, y0: f64, y1: f64) -> f64 {
@@ -203,7 +212,8 @@ impl Plane {
 }
 
 impl Seen {
-    fn of(lo: DVec3, hi: DVec3) -> Option<Self> {
+    /// `None` for a box over, under or around the point.
+    pub(crate) fn of(lo: DVec3, hi: DVec3) -> Option<Self> {
         if lo.x <= 0.0 && hi.x >= 0.0 && lo.z <= 0.0 && hi.z >= 0.0 {
             return None;
         }
@@ -279,7 +289,12 @@ mod tests {
             let b = Aabb { min: at.into(), max: glam::Vec3::from(at) + glam::Vec3::from(size) };
             let cone = Cone::of(tangents(&v), [f64::from(pitch); 2]);
             let mut found = vec![];
-            cone.sees(b.min.as_dvec3(), b.max.as_dvec3(), &mut Scratch::default(), |a| found.push(a));
+            let (lo, hi) = (b.min.as_dvec3(), b.max.as_dvec3());
+            cone.sees(lo, hi, Seen::of(lo, hi).as_ref(), &mut Scratch::default(), |a| found.push(a));
+            let mut listed = vec![];
+            cone.sees(lo, hi, None, &mut Scratch::default(), |a| listed.push(a));
+            let wide = |arcs: &[Arc]| arcs.iter().map(|a| f64::from(a.hi - a.lo)).sum::<f64>();
+            prop_assert!((wide(&found) - wide(&listed)).abs() < 16.0, "{found:?} and {listed:?}");
             // Turned by the widening and a little more, a border's answer is that of a yaw beside it.
             for i in 0..700u32 {
                 let yaw = i as f32 * std::f32::consts::TAU / 700.0;
@@ -299,7 +314,12 @@ mod tests {
             let b = Aabb { min: at.into(), max: glam::Vec3::from(at) + glam::Vec3::from(size) };
             let cone = Cone::of(tangents(&v), [f64::from(low), f64::from(low + width)]);
             let mut found = vec![];
-            cone.sees(b.min.as_dvec3(), b.max.as_dvec3(), &mut Scratch::default(), |a| found.push(a));
+            let (lo, hi) = (b.min.as_dvec3(), b.max.as_dvec3());
+            cone.sees(lo, hi, Seen::of(lo, hi).as_ref(), &mut Scratch::default(), |a| found.push(a));
+            let mut listed = vec![];
+            cone.sees(lo, hi, None, &mut Scratch::default(), |a| listed.push(a));
+            let wide = |arcs: &[Arc]| arcs.iter().map(|a| f64::from(a.hi - a.lo)).sum::<f64>();
+            prop_assert!((wide(&found) - wide(&listed)).abs() < 16.0, "{found:?} and {listed:?}");
             for i in 0..200u32 { for j in 0..=6u32 {
                 let (yaw, pitch) = (i as f32 * std::f32::consts::TAU / 200.0, low + width * j as f32 / 6.0);
                 let held = found.iter().any(|a| (a.lo..=a.hi).contains(&turn_of(yaw.into())));

@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use crate::arcs::{self, Arc};
-use crate::cone::{Cone, Scratch};
+use crate::cone::{Cone, Scratch, Seen};
 use crate::leaves::Leaves;
 
 /// A leaf's arc.
@@ -19,12 +19,16 @@ pub(crate) struct Span {
     pub(crate) leaf: u32,
 }
 
-/// All leaves' arcs from a point for one bin of pitches, those of a leaf together.
-pub(crate) fn spans(leaves: &Leaves, at: DVec3, cone: &Cone) -> Vec<Span> {
-    let mut out = Vec::with_capacity(leaves.len() + leaves.len() / 4);
+/// All leaves' arcs from a point for every bin of pitches, those of a leaf together.
+pub(crate) fn spans(leaves: &Leaves, at: DVec3, cones: &[Cone]) -> Vec<Vec<Span>> {
+    let mut out: Vec<Vec<Span>> = cones.iter().map(|_| Vec::with_capacity(leaves.len() + leaves.len() / 4)).collect();
     let mut scratch = Scratch::default();
     for i in 0..leaves.len() {
-        cone.sees(leaves.min[i] - at, leaves.max[i] - at, &mut scratch, |arc| out.push(Span { arc, leaf: i as u32 }));
+        let (lo, hi) = (leaves.min[i] - at, leaves.max[i] - at);
+        let seen = Seen::of(lo, hi);
+        for (cone, out) in cones.iter().zip(&mut out) {
+            cone.sees(lo, hi, seen.as_ref(), &mut scratch, |arc| out.push(Span { arc, leaf: i as u32 }));
+        }
     }
     out
 }

@@ -22,6 +22,8 @@ use crate::star::Stars;
 const MAX_POINTS: usize = 2_000_000;
 /// An image is this much farther than the star-shape's border, relatively: no eye stands in its plane.
 pub(crate) const CLEAR: f64 = 1.0001;
+/// Sampled rays meet a model space that is larger by this many spacings.
+const PAD: f64 = 0.02;
 /// Distance to the points looked at first, in spacings: most star-shapes are decided within.
 const FIRST: f64 = 4.6;
 
@@ -109,15 +111,15 @@ impl Judge<'_> {
         let at = sites.lattice.place(key);
         let spacing = f64::from(sites.lattice.cube(level)) * sites.lattice.unit;
         let near = |d: f64| blocks.near(key, (d / sites.lattice.unit).ceil().min(1e9) as i32);
-        // A model space without height still has to be met by sampled rays.
-        let space = [self.space[0] - 0.5 * spacing - at, self.space[1] + 0.5 * spacing - at];
+        // A model space thinner than the spacing, as eyes of one height have it, still has to be met by sampled rays.
+        let pad = (0.5 * (spacing - (self.space[1] - self.space[0]))).max(DVec3::splat(PAD * spacing));
+        let space = [self.space[0] - pad - at, self.space[1] + pad - at];
         let Some(radius) = self.stars.radius(space, FIRST * spacing, &near) else { return Verdict::Apart };
+        if self.leaves.total <= self.budget {
+            return Verdict::Serves(Serves { radius, images: false });
+        }
         let mut images = false;
-        for cone in self.cones {
-            if self.leaves.total <= self.budget {
-                break;
-            }
-            let spans = directions::spans(self.leaves, at, cone);
+        for (cone, spans) in self.cones.iter().zip(directions::spans(self.leaves, at, self.cones)) {
             if directions::most(self.leaves, &spans) <= self.budget {
                 continue;
             }
