@@ -125,13 +125,10 @@ impl Grid {
     /// Whether the views that were budgeted for hold the camera's.
     fn holds(&self, camera: &Camera) -> bool {
         let [tx, ty] = self.search.tan;
-        let f = camera.forward.as_dvec3();
-        let pitch = f.y.atan2(f.x.hypot(f.z));
         f64::from(-camera.left).max(camera.right_tan.into()) <= tx
             && f64::from(-camera.bottom).max(camera.top.into()) <= ty
             && f64::from(camera.right.y).abs() <= TURN_SLACK
-            && camera.up.y >= 0.0
-            && (self.pitch[0] - TURN_SLACK..=self.pitch[1] + TURN_SLACK).contains(&pitch)
+            && (self.pitch[0] - TURN_SLACK..=self.pitch[1] + TURN_SLACK).contains(&turned(camera)[1])
     }
 
     /// The images of a point, with their axes, and which bins of its directions use which.
@@ -260,8 +257,7 @@ impl Cells for Grid {
 
 impl Grid {
     fn split(&self, directions: &Directions, camera: &Camera) -> u32 {
-        let f = camera.forward.as_dvec3();
-        let (yaw, pitch) = ((-f.x).atan2(-f.z), f.y.atan2(f.x.hypot(f.z)));
+        let [yaw, pitch] = turned(camera);
         let count = self.cones.len();
         let part = (pitch - self.pitch[0]) / (self.pitch[1] - self.pitch[0]).max(f64::MIN_POSITIVE);
         let bin = ((part * count as f64).floor().max(0.0) as usize).min(count - 1);
@@ -269,6 +265,13 @@ impl Grid {
         let turn = turn_of(yaw);
         runs.get(runs.partition_point(|r| r.0 <= turn).saturating_sub(1)).map_or(0, |r| r.1)
     }
+}
+
+/// A level camera's yaw and pitch, radians; above a right angle for one that stands on its head. The right side tells the yaw
+/// even straight up or down.
+fn turned(camera: &Camera) -> [f64; 2] {
+    let (r, f) = (camera.right.as_dvec3(), camera.forward.as_dvec3());
+    [(-r.z).atan2(r.x), f.y.atan2(f.x * r.z - f.z * r.x)]
 }
 
 /// The side planes of the budgeted frustum in the camera's axes: what the camera sees lies inside.

@@ -24,6 +24,9 @@ use glam::DVec3;
 
 use crate::arcs::{self, Arc, FULL};
 
+/// The cosine of a pitch that is as good as vertical.
+const STEEP: f64 = 1e-6;
+
 /// One side plane over a range of pitches.
 #[derive(Clone, Copy, Debug)]
 struct Plane {
@@ -188,6 +191,14 @@ impl Cone {
         let (sp, cp) = self.middle;
         let least = (sp * lo.y).min(sp * hi.y);
         let Some(seen) = Seen::of(lo, hi) else { return };
+        // Straight up or down yaw hardly turns the axis, and rounding may have taken the pitch past the vertical.
+        if cp < STEEP {
+            let farthest = seen.rho.into_iter().fold(0.0, f64::max);
+            if least - STEEP * farthest >= depth {
+                arcs::inner(-4.0, 4.0, emit);
+            }
+            return;
+        }
         let (mut a, mut b) = (f64::NEG_INFINITY, f64::INFINITY);
         for (rel, rho) in seen.rel.iter().zip(seen.rho) {
             let cosine = (depth - least) / (cp * rho);

@@ -106,8 +106,8 @@ impl Search {
             return None;
         }
         let lists = rank(&mut entries);
-        let most = entries.len() as u32 - 1;
-        let mut tuple = Tuple { from: [0; 3], to: [most; 2] };
+        let picture = Picture { entries, lists };
+        let most = picture.entries.len() as u32 - 1;
         let mut step = 1;
         while most >> step > 0 {
             step += 1;
@@ -116,20 +116,17 @@ impl Search {
         let mut members: Vec<u32> = (0..=most).collect();
         let mut levels = vec![vec![]; self.look_ahead as usize + 1];
         while shift <= step {
-            match self.best(&lists, &entries, &members, tuple, seen, shift, 0, &mut levels) {
-                Some((_, next)) => {
-                    tuple = next;
-                    members.retain(|&i| tuple.holds(&entries[i as usize]));
-                }
+            match self.best(&picture, &members, seen, shift, 0, &mut levels) {
+                Some((_, next)) => members.retain(|&i| next.holds(&picture.entries[i as usize])),
                 None => shift += 1,
             }
         }
         let (mut lo, mut hi, mut taken) = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0);
-        for e in members.iter().map(|&i| &entries[i as usize]) {
+        for e in members.iter().map(|&i| &picture.entries[i as usize]) {
             (lo, hi, taken) = (lo.min(e.lo), hi.max(e.hi), taken + e.triangles);
         }
         let corner = |x: f64, y: f64| at + (axis + right * x + up * y) * lo.z;
-        let mut chosen: Vec<u32> = members.iter().map(|&i| entries[i as usize].leaf).collect();
+        let mut chosen: Vec<u32> = members.iter().map(|&i| picture.entries[i as usize].leaf).collect();
         chosen.sort_unstable();
         Some(Placed {
             leaves: chosen,
@@ -139,27 +136,25 @@ impl Search {
     }
 
     /// The best of the five subsets a step further, by the best value within `look_ahead` more steps.
-    #[expect(clippy::too_many_arguments, reason = "a recursion whose state lives in its caller's buffers")]
     fn best(
         &self,
-        lists: &Lists,
-        entries: &[Entry],
+        picture: &Picture,
         members: &[u32],
-        tuple: Tuple,
         seen: u64,
         shift: u32,
         ahead: u32,
         levels: &mut [Vec<u32>],
     ) -> Option<(f64, Tuple)> {
         let (mine, deeper) = levels.split_first_mut()?;
+        let tuple = picture.around(members);
         let mut best: Option<(f64, Tuple)> = None;
         for side in SIDES {
-            let Some(next) = tuple.moved(side, shift, lists) else { continue };
+            let Some(next) = tuple.moved(side, shift, &picture.lists) else { continue };
             mine.clear();
             let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
             let (mut taken, mut distance) = (0, f64::INFINITY);
             for &i in members {
-                let e = &entries[i as usize];
+                let e = &picture.entries[i as usize];
                 if !next.holds(e) {
                     continue;
                 }
@@ -173,7 +168,7 @@ impl Search {
             }
             let mut value = self.value(seen - taken, seen, lo, hi, distance);
             if ahead < self.look_ahead
-                && let Some((later, _)) = self.best(lists, entries, mine, next, seen, shift, ahead + 1, deeper)
+                && let Some((later, _)) = self.best(picture, mine, seen, shift, ahead + 1, deeper)
             {
                 value = value.max(later);
             }
@@ -230,13 +225,31 @@ fn rank(entries: &mut [Entry]) -> Lists {
     lists
 }
 
+/// The leaves in the picture and their borders.
+struct Picture {
+    entries: Vec<Entry>,
+    lists: Lists,
+}
+
+impl Picture {
+    /// The closest indices that name a subset.
+    fn around(&self, members: &[u32]) -> Tuple {
+        let mut tuple = Tuple { from: [u32::MAX; 3], to: [0; 2] };
+        for e in members.iter().map(|&i| &self.entries[i as usize]) {
+            (0..3).for_each(|k| tuple.from[k] = tuple.from[k].min(e.from[k]));
+            (0..2).for_each(|k| tuple.to[k] = tuple.to[k].max(e.to[k]));
+        }
+        tuple
+    }
+}
+
 impl Tuple {
     fn holds(&self, e: &Entry) -> bool {
         (0..3).all(|k| e.from[k] >= self.from[k]) && (0..2).all(|k| e.to[k] <= self.to[k])
     }
 
-    /// The tuple with one border moved by a 2^shift-th of the places between it and the opposite one, and on to the next border
-    /// that differs. `None` where it is too near the opposite one.
+    /// The tuple with one border moved by a 2^shift-th of the places between it and the opposite one, at least one, and on to
+    /// the next border that differs. `None` at the end of the list.
     fn moved(mut self, side: Side, shift: u32, lists: &Lists) -> Option<Self> {
         let last = lists.from[0].len() as u32 - 1;
         let (axis, upper) = match side {
@@ -247,14 +260,11 @@ impl Tuple {
             Side::Left => (0, false),
         };
         let (from, to) = (self.from[axis], if axis == 2 { last } else { self.to[axis] });
-        let by = to.checked_sub(from)?.div_ceil(1 << shift);
-        if by == 0 {
-            return None;
-        }
+        let by = to.saturating_sub(from).div_ceil(1 << shift).max(1);
         if upper {
             let list = &lists.to[axis];
             // Down to the last entry of the border there: entries of one border leave together.
-            let place = (to - by) as usize;
+            let place = to.checked_sub(by)? as usize;
             let end = list.partition_point(|&v| v <= list[place]) as u32 - 1;
             let end =
                 if end < to { end } else { (list.partition_point(|&v| v < list[place]) as u32).checked_sub(1)? };
@@ -262,6 +272,9 @@ impl Tuple {
         } else {
             let list = &lists.from[axis];
             let place = (from + by) as usize;
+            if place > last as usize {
+                return None;
+            }
             let start = list.partition_point(|&v| v < list[place]) as u32;
             let start = if start > from { start } else { list.partition_point(|&v| v <= list[place]) as u32 };
             if start > last {
@@ -276,4 +289,63 @@ impl Tuple {
 /// The window of an image, for far fields.
 pub(crate) fn window(placed: &Placed, axis: DVec3, px_per_tan: f32) -> Window {
     Window { axis: axis.as_vec3(), corners: placed.window.map(|c| c.as_vec3()), px_per_tan }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_subset_is_contiguous_within_the_budget_and_no_side_can_be_moved_further(
+            at in prop::collection::vec((-9f64..9.0, -5f64..5.0, -30f64..-3.0, 0.1f64..2.0, 1u32..100), 1..60),
+            share in 0.0f64..1.0, look_ahead in 0u32..3
+        ) {
+            let mut leaves = Leaves::default();
+            for (x, y, z, s, n) in &at {
+                // Some borders are the same.
+                let c = DVec3::new(x.round(), *y, z.round());
+                leaves.min.push(c - *s);
+                leaves.max.push(c + *s);
+                leaves.triangles.push(*n);
+            }
+            let visible: Vec<u32> = (0..at.len() as u32).collect();
+            let seen: u64 = leaves.triangles.iter().map(|&t| u64::from(t)).sum();
+            let budget = (share * seen as f64) as u64;
+            let search = Search { weights: [0.4, 0.6, 0.1, 0.9], look_ahead, longest: 30.0, tan: [0.6, 0.5], budget };
+            let frame = [DVec3::X, DVec3::Y, DVec3::NEG_Z];
+            let entries: Vec<Entry> =
+                visible.iter().filter_map(|&l| entry(&leaves, l, DVec3::ZERO, frame, 4.0)).collect();
+            let placed = search.place(&leaves, DVec3::ZERO, DVec3::NEG_Z, &visible, seen, 4.0);
+            prop_assert_eq!(placed.is_none(), entries.is_empty());
+            let Some(placed) = placed else { return Ok(()) };
+            let member = |e: &&Entry| placed.leaves.contains(&e.leaf);
+            let taken = |of: &dyn Fn(&Entry) -> bool| -> u64 {
+                entries.iter().filter(member).filter(|e| of(e)).map(|e| e.triangles).sum()
+            };
+            prop_assert_eq!(placed.left, seen - taken(&|_| true));
+            let all: u64 = entries.iter().map(|e| e.triangles).sum();
+            if seen - all > budget {
+                prop_assert_eq!(placed.leaves.len(), entries.len());
+                return Ok(());
+            }
+            prop_assert!(placed.left <= budget);
+            let (lo, hi) = entries.iter().filter(member).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |b, e| (b.0.min(e.lo), b.1.max(e.hi)));
+            for e in &entries {
+                let within = e.lo.cmpge(lo).all() && e.hi.truncate().cmple(hi.truncate()).all();
+                prop_assert_eq!(within, member(&e), "{:?}", e);
+            }
+            prop_assert!(placed.window.iter().all(|c| (-c.z - lo.z).abs() < 1e-9));
+            // Without the entries of any one border, too much is left, or nothing is taken.
+            for k in 0..3 {
+                let kept = taken(&|e| e.lo[k] > lo[k]);
+                prop_assert!(kept == 0 || seen - kept > budget);
+            }
+            for k in 0..2 {
+                let kept = taken(&|e| e.hi[k] < hi[k]);
+                prop_assert!(kept == 0 || seen - kept > budget);
+            }
+        }
+    }
 }

@@ -22,11 +22,11 @@ use glam::DVec3;
 /// For what lies between sampled directions and rays. The tests find no eye past 0.96 of the radius.
 const MARGIN: f64 = 1.03;
 /// Yaws, an odd number, so that the symmetries of a lattice turn them into more.
-const YAWS: u32 = 97;
+const YAWS: u32 = 181;
 /// Rays along each side of the picture.
 const RAYS: u32 = 5;
 /// The directions whose farthest rays are improved, and how often steps are halved.
-const CLIMBS: usize = 24;
+const CLIMBS: usize = 60;
 const HALVINGS: u32 = 8;
 /// Pitches are sampled at least this closely, radians.
 const PITCH_STEP: f64 = 0.14;
