@@ -67,11 +67,17 @@ struct Ray {
 /// A view direction and a ray in its picture: yaw and pitch, radians, and -1..1 from left to right and from bottom to top.
 type Sample = [f64; 4];
 
+/// A sampled view: its side planes and its rays.
+struct Direction {
+    normals: [DVec3; 4],
+    rays: Vec<(Ray, Sample)>,
+}
+
 /// The sampled views.
 pub(crate) struct Stars {
     tan: [f64; 2],
     pitch: [f64; 2],
-    directions: Vec<([DVec3; 4], Vec<(Ray, Sample)>)>,
+    directions: Vec<Direction>,
     /// Steps from a sample towards the next ones.
     steps: Sample,
 }
@@ -94,7 +100,7 @@ impl Stars {
                     let sample = [yaw, pitch, at(x), at(y)];
                     (ray(tan, sample).1, sample)
                 });
-                directions.push((frustum(yaw, pitch, tan), rays.collect()));
+                directions.push(Direction { normals: frustum(yaw, pitch, tan), rays: rays.collect() });
             }
         }
         let steps = [TAU / f64::from(YAWS), if pitches > 1 { PITCH_STEP } else { 0.0 }, 0.5, 0.5].map(|s| 0.5 * s);
@@ -113,7 +119,7 @@ impl Stars {
         let mut around = Around { reach: first, others: near(first), near };
         // The farthest ray of the best directions, farthest first.
         let mut best: Vec<(f64, Sample)> = vec![];
-        for (normals, rays) in &self.directions {
+        for Direction { normals, rays } in &self.directions {
             let mut farthest: Option<(f64, Sample)> = None;
             for (ray, sample) in rays {
                 let Some([from, to]) = through(ray.v, space) else { continue };
