@@ -6,6 +6,7 @@
 //! Expected, with 2 threads and no pitch: three lines, the one of 150,000 with about 600 images, each placed within 1 % of the
 //! optimisation budget.
 
+use std::f64::consts::FRAC_PI_2;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -78,7 +79,7 @@ fn scene() -> Result<Scene, Fault> {
     let mesh = b.mesh("pipe", pipe())?;
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut unit = || f64::from(rng.next_u32()) / f64::from(u32::MAX);
-    let turns = [DQuat::IDENTITY, DQuat::from_rotation_y(1.5707963), DQuat::from_rotation_z(1.5707963)];
+    let turns = [DQuat::IDENTITY, DQuat::from_rotation_y(FRAC_PI_2), DQuat::from_rotation_z(FRAC_PI_2)];
     for i in 0..PIPES {
         let at = DVec3::new(unit(), unit(), unit()) * SIDE;
         b.place(Placement { mesh, transform: DAffine3::from_rotation_translation(turns[i % 3], at) });
