@@ -15,6 +15,8 @@
 //!   spacings, so fields of view from 45 degrees are served; the paper's bound was 54. `find` turns to the next point where a
 //!   radius does not hold the eye.
 //! * A range of pitches is cut into bins; each is budgeted for all views of the bin together. A fixed pitch is exact.
+//! * A cell's claim is of the views for which `find` gives it, with the split that `active` gives: a star-shape also holds eyes
+//!   whose reverse frustum does not hold the point, and these use another.
 //! * Points that no eye of the model space uses are left out. Points that never see more than the budget have no image and serve
 //!   any eye; a scene within the budget gives cells without sectors alone.
 //! * The optimisation budget is the budget less 5 % of the scene's triangles (the paper's 5 to 10 %), but at least half the budget.
