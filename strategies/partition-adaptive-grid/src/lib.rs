@@ -204,6 +204,7 @@ impl Partition for AdaptiveGrid {
             stars: Stars::of(tan, pitch),
             space,
             budget: self.budget,
+            aim: self.placed_for(scene),
             max_level: self.max_level,
         };
         let (sites, settled) = settle(&judge, lattice, cx)?;

@@ -1,8 +1,9 @@
 //! Where grid points are needed: dividing until every point can serve its star-shape.
 //!
 //! A point is judged without placing an image. Where it sees more than the budget in some view, an image has to replace
-//! enough of what lies wholly beyond its star-shape, so that the image is in front of every eye that may use it. If too much
-//! is left for some view even when all of that is replaced, the point is divided: it and its neighbours come to have smaller
+//! enough of what lies wholly beyond its star-shape, so that the image is in front of every eye that may use it. If more than the
+//! optimisation budget is left for some view even when all of that is replaced, the point is divided (one that keeps the
+//! budget itself is not, where no smaller star-shape would bring the rest down to it): it and its neighbours come to have smaller
 //! star-shapes. Points only come, and others only make a star-shape smaller, so a point that passed stays as it is and
 //! keeps the radius with which it passed. Neighbours are held within one level of each other.
 //!
@@ -39,6 +40,8 @@ pub(crate) struct Judge<'a> {
     pub(crate) space: [DVec3; 2],
     /// The most triangles of any view.
     pub(crate) budget: u64,
+    /// The most triangles that images are to leave, where dividing can help.
+    pub(crate) aim: u64,
     /// The greatest level.
     pub(crate) max_level: u32,
 }
@@ -126,7 +129,9 @@ impl Judge<'_> {
             images = true;
             let left = |depth: f64| directions::most_before(self.leaves, &spans, at, cone, depth);
             let kept = left(radius * CLEAR);
-            if kept > self.budget {
+            // What cannot come within the optimisation budget even with everything ahead replaced need not be tried.
+            let helps = || level < self.max_level && left(f64::MIN_POSITIVE) <= self.aim;
+            if kept > self.budget || (kept > self.aim && helps()) {
                 let inside = self.space[0].cmple(at).all() && self.space[1].cmpge(at).all();
                 return Verdict::Divide { left: kept, at_least: inside.then(|| left(f64::MIN_POSITIVE)) };
             }
