@@ -35,7 +35,7 @@ fn experiment(folder: &Path, build: &str, on_demand_ms: f64) -> Experiment {
         build = "{build}"
         partition = {{ type = "adaptive-grid", budget = {BUDGET} }}
         far_field = {{ type = "layered-depth-image" }}
-        scheduler = {{ type = "near-to-far-lru" }}
+        scheduler = {{ type = "near-to-far-lru", radius = 0.0 }}
         "#
     );
     let text = stones::experiment([96, 72], &pipelines);
