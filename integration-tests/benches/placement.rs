@@ -167,14 +167,12 @@ fn plot(file: &Path, rows: &[Row]) -> Result<(), Error> {
         .y_desc("images / triangles (logarithmic)")
         .light_line_style(WHITE)
         .draw()?;
-    let shares = || (20..=100).map(|i| f64::from(i) * 0.5);
-    let lines: [(&str, RGBColor, Vec<(f64, f64)>); 2] = [
-        ("best case", BLACK, shares().map(|p| (p, best(p / 100.0) / g)).collect()),
-        (
-            "near-worst case",
-            RGBColor(150, 150, 150),
-            shares().map(|p| (p, near_worst(p / 100.0, levels) / g)).collect(),
-        ),
+    let curve = |images: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
+        (20..=100).map(|i| f64::from(i) * 0.5).map(|p| (p, images(p / 100.0) / g)).collect()
+    };
+    let lines = [
+        ("best case", BLACK, curve(&best)),
+        ("near-worst case", RGBColor(150, 150, 150), curve(&|f| near_worst(f, levels))),
     ];
     for (name, color, points) in lines {
         let line = chart.draw_series(LineSeries::new(points, color))?;
