@@ -19,6 +19,9 @@ struct FirstRun;
 #[doc = include_str!("../../book/src/introduction.md")]
 struct Introduction;
 
+#[doc = include_str!("../../book/src/layered-depth-images.md")]
+struct LayeredDepthImages;
+
 #[doc = include_str!("../../book/src/measuring.md")]
 struct Measuring;
 

@@ -13,7 +13,7 @@ use farfield_integration_tests::lab::{Lab, backends, errors};
 use farfield_integration_tests::stones;
 
 /// Required settings: of what, and its value.
-const GIVEN: [(&str, &str, &str); 2] = [("adaptive-grid", "budget", "1500"), ("hex-cells", "edge", "3.0")];
+const GIVEN: [(&str, &str, &str); 2] = [("adaptive-grid", "budget", "6000"), ("hex-cells", "edge", "3.0")];
 
 /// More than the defaults: partitions that make a far field do something else.
 const VARIANTS: [(&str, &str); 1] = [("single-cell", "region = [-8.0, 1.0, -1.0, -4.0, 2.0, 1.0]")];
