@@ -69,7 +69,7 @@ pub fn table(runs: &[(String, Summary)]) -> String {
 }
 
 /// The columns of [`table`] and of the report's first table.
-const COLUMNS: [&str; 13] = [
+const COLUMNS: [&str; 15] = [
     "pipeline",
     "frame ms",
     "p95 ms",
@@ -77,7 +77,9 @@ const COLUMNS: [&str; 13] = [
     "triangles",
     "near",
     "far",
+    "points",
     "PSNR-Y dB",
+    "pooled dB",
     "objects dB",
     "SSIM",
     "FLIP",
