@@ -42,7 +42,7 @@ pub struct Counted {
     pub far_triangles: u64,
     /// Samples of layered depth images warped.
     pub samples: u64,
-    /// Primitives that reached the clipper, where the device counts them.
+    /// Primitives that reached the clipper, where the device counts them; a layered depth image adds one that covers the picture.
     pub clipped_primitives: Option<u64>,
 }
 
@@ -141,8 +141,14 @@ fn layered(l: &crate::layered::LayeredPart) -> Option<String> {
     if [counted, l.albedo.len(), l.normal.len(), l.object.len()] != [n; 4] {
         return Some(format!("{n} depths, but {counted} counted samples"));
     }
+    let c = &l.camera;
+    let axes = [c.right, c.up, c.forward].iter().all(|a| a.is_finite()) && c.eye.is_finite();
+    if !(axes && [c.left, c.right_tan, c.bottom, c.top].iter().all(|t| t.is_finite())) {
+        return Some("a camera that is not finite".into());
+    }
     let [near, far] = l.inverse_depth;
-    if !(near > 0.0 && far > 0.0 && far <= near && near.is_finite()) {
+    let depths = near > 0.0 && far > 0.0 && far <= near && near.is_finite() && far.recip().is_finite();
+    if !depths {
         return Some(format!("depths from 1 / {near} to 1 / {far}"));
     }
     let object = l.object.iter().find(|&&o| usize::from(o) >= l.objects.len());

@@ -67,12 +67,17 @@ impl LayeredPart {
         (t.clamp(0.0, 1.0) * 65535.0).round() as u16
     }
 
-    /// The most that rounding of depths moves a sample's image, pixels, for an eye `moved` scene units away from the image's with
-    /// `px_per_tan` pixels a unit tangent, per unit of stretch: half a step of 1 / depth seen over the whole move,
-    /// moved * px_per_tan * (near - far) / (2 * 65535), where near and far are the ends of [`LayeredPart::inverse_depth`].
-    /// Holds on the picture's axis for eyes that the samples' depths exceed by much; elsewhere times z / z' of the warp.
+    /// A bound of how far rounding of depths moves a sample's image, pixels a unit of the viewer's stretch (1 / cos^2 of the angle to
+    /// its axis), for an eye at most `moved` scene units away from the image's with `px_per_tan` pixels a unit tangent; infinite where
+    /// such an eye may touch a sample.
+    ///
+    /// With the eye at o, a ray r (|r| >= 1) and w = 1 / z the sample stands at r / w - o. Half a step of w, d = (near - far) / (2 * 65535)
+    /// with the ends of [`LayeredPart::inverse_depth`], moves it by z^2 d along r, which is seen under at most z^2 d |o x r| / (z |r| - |o|)^2
+    /// <= moved d / (1 - moved near)^2 radians.
     pub fn rounding_px(&self, moved: f32, px_per_tan: f32) -> f32 {
-        moved * px_per_tan * (self.inverse_depth[0] - self.inverse_depth[1]) / (2.0 * 65535.0)
+        let [near, far] = self.inverse_depth;
+        let left = 1.0 - moved * near;
+        if left <= 0.0 { f32::INFINITY } else { moved * px_per_tan * (near - far) / (2.0 * 65535.0) / (left * left) }
     }
 
     /// Unit normal of a sample.
@@ -245,6 +250,32 @@ mod tests {
             let ends = [1.0 / 2.0, 1.0 / 500.0];
             let back = depth_of(LayeredPart::quantise(z, ends), ends);
             prop_assert!((1.0 / back - 1.0 / z).abs() <= 0.51 * (ends[0] - ends[1]) / 65535.0);
+        }
+
+        #[test]
+        fn rounding_moves_an_image_no_farther_than_stated(
+            o in [-1f32..1.0, -1f32..1.0, -1f32..1.0], x in 0f32..64.0, y in 0f32..48.0, z in 2f32..50.0
+        ) {
+            let c = image();
+            let part = LayeredPart {
+                camera: c,
+                inverse_depth: [0.5, 0.02],
+                counts: vec![],
+                depth: vec![],
+                albedo: vec![],
+                normal: vec![],
+                object: vec![],
+                objects: vec![],
+                smooth: false,
+            };
+            let eye = Vec3::from(o);
+            let step = (0.5 - 0.02) / 65535.0;
+            let ray = c.ray(x, y);
+            let at = |w: f32| (ray.as_dvec3() / f64::from(w) - eye.as_dvec3()).normalize();
+            // The whole step, in 64 bits, so that the bound of half a step is held to what can be measured.
+            let angle = at(1.0 / z).angle_between(at(1.0 / z + step));
+            let bound = f64::from(part.rounding_px(eye.length(), 1.0)) * 2.0;
+            prop_assert!(angle <= bound * 1.001 + 1e-7, "{angle} against {bound}");
         }
 
         #[test]

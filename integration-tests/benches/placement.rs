@@ -30,7 +30,7 @@ use farfield_experiments::build::{NoCapture, Pool};
 use farfield_experiments::run::{Options, build_pipelines, prepare};
 use farfield_experiments::store::Store;
 use farfield_experiments::{config, list::entries};
-use farfield_partition_adaptive_grid::Directions;
+use farfield_partition_adaptive_grid::{AdaptiveGrid, Directions};
 use plotters::prelude::*;
 
 static NEVER: AtomicBool = AtomicBool::new(false);
@@ -80,7 +80,7 @@ fn one(triangles: u64, budget: u64, bake: usize) -> Result<Row, Error> {
     let images: usize = insides.iter().map(|c| c.sectors.len()).sum();
     let with: Vec<&Cell> = insides.iter().filter(|c| !c.sectors.is_empty()).collect();
     let all = scene.triangles();
-    let target = budget.saturating_sub(all / 20).max(budget.div_ceil(2)) as f64;
+    let target = AdaptiveGrid::new(budget).placed_for(scene) as f64;
     let mut off: Vec<f64> = vec![];
     for c in &with {
         off.extend(Directions::of(c)?.left.iter().map(|&l| (l as f64 - target).abs() / target));

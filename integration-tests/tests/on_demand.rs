@@ -1,5 +1,5 @@
 //! Cells built while walking: what is not there yet is a counted hole, never geometry over the budget; what was built is stored,
-//! so that the second walk misses less; and a budget of no time builds nothing.
+//! so that the second walk builds nothing; and a budget of no time builds nothing.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;

@@ -89,11 +89,12 @@ impl TryFrom<Stored> for LayeredPart {
     type Error = String;
 
     fn try_from(s: Stored) -> Result<Self, String> {
-        let order = by_layers(&s.counts);
-        let n = order.len();
+        // The counts may lie: nothing is laid out for them before they fit what there is.
+        let n: usize = s.counts.iter().map(|&c| usize::from(c)).sum();
         if [s.depth.len(), s.albedo.len(), s.normal.len(), s.object.len()] != [2 * n, 3 * n, 2 * n, 2 * n] {
             return Err(format!("a layered depth image of {n} counted samples has planes of another length"));
         }
+        let order = by_layers(&s.counts);
         let word = |plane: &[u8], i: usize| u16::from_le_bytes([plane[i], plane[n + i]]);
         let (mut depth, mut object) = (vec![0; n], vec![0; n]);
         let (mut albedo, mut normal) = (vec![[0; 3]; n], vec![[0; 2]; n]);

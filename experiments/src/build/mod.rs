@@ -73,14 +73,16 @@ impl Site<'_> {
         Context { capture: self.capture, run: &Pool, memo, cancel: self.cancel }
     }
 
-    /// A cell's inside alone, its far field to be built later.
+    /// A cell's inside alone, its far field to be built later where it has something to build.
     ///
     /// # Errors
     /// What the partition gives.
-    pub fn inside_of(&self, pipeline: &Pipeline, division: &Division, id: CellId) -> Result<BuiltCell, Fault> {
+    pub fn inside_of(&self, pipeline: &Pipeline, division: &Division, id: CellId) -> Result<(BuiltCell, Needs), Fault> {
         let memo = self.memo();
         let (_, cell) = self.inside(pipeline, division, id, &self.context(&memo))?;
-        Ok(BuiltCell { cell, manifest: None })
+        let needs = pipeline.far_field.needs(self.scene, Some(&cell))?;
+        let manifest = (!needs.cell_asset).then(Manifest::default);
+        Ok((BuiltCell { cell, manifest }, needs))
     }
 
     fn memo(&self) -> StoreMemo<'_> {

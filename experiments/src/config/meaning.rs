@@ -6,8 +6,8 @@ use std::path::Path;
 use serde_json::{Map, Value};
 
 use super::mistakes::Collector;
-use super::node::{At, Node};
-use super::settings::Generated;
+use super::node::{At, Node, What};
+use super::settings::{BuildWhen, Generated};
 use crate::generate::gallery_height;
 use crate::path::PATHS;
 
@@ -170,5 +170,15 @@ fn reference(
                 reference.insert("pipeline".into(), (*first).into());
             }
         }
+    }
+    // What others are compared with may not lack anything, and what is built on demand does until it is there.
+    let chosen = reference.get("pipeline").and_then(Value::as_str).and_then(|n| names.iter().position(|m| *m == n));
+    let of = |i: usize| match root.get("pipeline").map(|n| &n.what) {
+        Some(What::List(l)) => l.get(i).and_then(|p| p.get("build")),
+        _ => None,
+    };
+    if let Some(build) = chosen.and_then(of).filter(|b| b.text() == Some(BuildWhen::OnDemand.name())) {
+        let help = "[reference] pipeline = ... names another".to_owned();
+        mistakes.add(&build.at, "the reference is built ahead of the walk", "not on demand", Some(help));
     }
 }

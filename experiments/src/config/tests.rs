@@ -162,3 +162,11 @@ fn pipes_bring_their_own_size_and_eye_height() {
     let all = told(&text.replace("\"pipes\"", "\"pipes\"\nmodels = \"/\""), &[]);
     assert_eq!(all, ["park.toml:4:10: `models` makes a park; pipes are not made of them"]);
 }
+
+#[test]
+fn the_reference_is_not_built_on_demand() {
+    let text = "[scene]\nsource = \"park\"\n[[pipeline]]\nname = \"a\"\nbuild = \"on-demand\"\nfar_field = { type = \"geometry\" }\n\
+                [[pipeline]]\nname = \"b\"\nfar_field = { type = \"geometry\" }\n";
+    assert!(told(text, &[])[0].starts_with("park.toml:5:9: the reference is built ahead"), "{:?}", told(text, &[]));
+    assert!(read(&format!("{text}[reference]\npipeline = \"b\"\n"), &[]).is_ok());
+}

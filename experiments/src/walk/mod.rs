@@ -136,11 +136,12 @@ impl<'a> Walker<'a> {
             let bytes = sizes.get(&block).copied().unwrap_or(0);
             // At least one block a frame, or one that is larger than the limit would never come. What is left waits, in its
             // order: a later, smaller block may be useless without it.
-            if uploaded > 0 && self.upload_bytes_per_frame.is_some_and(|most| uploaded + bytes > most) {
+            let there = self.residency.has(block);
+            if !there && uploaded > 0 && self.upload_bytes_per_frame.is_some_and(|most| uploaded + bytes > most) {
                 break;
             }
             let texels = opened.stored(block).map_or(0, |s| s.texture_bytes);
-            if self.residency.hold(self.device, block, true, texels, scene, &fetch)? {
+            if self.residency.hold(self.device, block, true, texels, scene, &fetch)? && !there {
                 uploaded += bytes;
             }
         }
@@ -156,7 +157,7 @@ impl<'a> Walker<'a> {
     /// # Errors
     /// What loading and drawing give.
     pub fn step(&mut self, camera: &Camera) -> Result<Walked, Fault> {
-        if let Some(builder) = &self.on_demand {
+        if let Some(builder) = &mut self.on_demand {
             builder.enter(&mut self.opened, camera)?;
         }
         let cell = self.opened.cell_of(camera);

@@ -10,8 +10,7 @@ use farfield_core::id::CellId;
 use farfield_core::{Camera, Fault};
 
 use super::opened::Opened;
-use crate::build::Site;
-use crate::results::Preprocess;
+use crate::build::{Site, peak_rss_bytes};
 
 /// See the module.
 pub struct OnDemand<'a> {
@@ -27,16 +26,30 @@ impl<'a> OnDemand<'a> {
         Self { site, ms_per_frame, account_ms: 0.0 }
     }
 
-    /// Makes the inside of the cell that serves a camera.
+    /// Makes the inside of the cell that serves a camera; where its far field has nothing to build, all of it.
     ///
     /// # Errors
     /// What the partition gives.
-    pub(super) fn enter(&self, opened: &mut Opened<'_>, camera: &Camera) -> Result<(), Fault> {
+    pub(super) fn enter(&mut self, opened: &mut Opened<'_>, camera: &Camera) -> Result<(), Fault> {
         let Some(id) = opened.division.cells.find(camera) else { return Ok(()) };
         if opened.built.cells.contains_key(&id) {
             return Ok(());
         }
-        opened.add(id, self.site.inside_of(opened.pipeline, opened.division, id)?)
+        let start = Instant::now();
+        let (cell, needs) = self.site.inside_of(opened.pipeline, opened.division, id)?;
+        self.charge(opened, start, true);
+        opened.built.covers = needs.covers;
+        opened.note(&needs.left_out);
+        opened.add(id, cell)
+    }
+
+    /// Takes the time since `start` from the account; what was not in the store counts as building.
+    fn charge(&mut self, opened: &mut Opened<'_>, start: Instant, new: bool) {
+        let seconds = start.elapsed().as_secs_f64();
+        self.account_ms -= 1e3 * seconds;
+        let p = &mut opened.built.preprocess;
+        p.seconds += if new { seconds } else { 0.0 };
+        p.peak_rss_bytes = peak_rss_bytes();
     }
 
     /// Builds the cell that serves a camera, whatever time it takes.
@@ -65,15 +78,12 @@ impl<'a> OnDemand<'a> {
             let start = Instant::now();
             let shared = opened.built.shared.as_ref().map(|s| (s.0, &s.1));
             let (id, cell, needs, new) = self.site.cell(opened.pipeline, opened.division, id, shared)?;
-            let seconds = start.elapsed().as_secs_f64();
-            self.account_ms -= 1e3 * seconds;
+            self.charge(opened, start, new);
             opened.built.covers = needs.covers;
-            let bytes = cell.manifest.as_ref().map_or(0, |m| m.bytes() + m.index.len() as u64);
-            let Preprocess { seconds: spent, cells_built, bytes_stored, .. } = &mut opened.built.preprocess;
-            *bytes_stored += bytes;
-            if new {
-                *spent += seconds;
-                *cells_built += 1;
+            opened.built.preprocess.cells_built += usize::from(new);
+            if let Some(m) = &cell.manifest {
+                opened.built.preprocess.bytes_stored += m.bytes() + m.index.len() as u64;
+                opened.note(&m.left_out);
             }
             opened.note(&needs.left_out);
             opened.add(id, cell)?;

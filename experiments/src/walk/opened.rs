@@ -184,9 +184,10 @@ impl<'a> Opened<'a> {
         }
         if let Some(id) = cell {
             let achieved = self.with_view(id, camera, |far, view| far.draw(resident, view, &mut draws).missing);
-            // A cell that is not built yet lacks what its windows show.
+            // A cell that is not built yet lacks what its windows show, or all of it.
             let windows = || self.active(id, camera).map_or(0, |(_, at)| at.sectors.len() as u32);
-            missing += achieved.unwrap_or_else(windows);
+            let everything = u32::from(self.built.covers == Covers::Everything);
+            missing += achieved.unwrap_or_else(|| windows().max(everything));
         }
         Drawn { cell, draws, missing }
     }

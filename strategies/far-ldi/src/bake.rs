@@ -131,13 +131,14 @@ fn picture(payload: u32, sector: &Sector, cell: &Cell, framed: &Framed, part: &L
         split: sector.split.0,
         bounds,
         corners,
-        bytes: part.bytes(),
+        // What the largest of the backends needs: 16 bytes a sample and 4 an object on a GPU.
+        bytes: part.bytes().max(16 * part.samples() as u64 + 4 * part.objects.len().next_multiple_of(4) as u64),
         size: c.size,
         covered: part.counts.iter().filter(|n| **n > 0).count() as u64,
         samples: part.samples() as u64,
         deepest: u32::from(part.counts.iter().copied().max().unwrap_or(0)),
         coarse: framed.coarse,
-        rounding_px: part.rounding_px(moved, sector.window.px_per_tan),
+        rounding_px: part.rounding_px(moved.min(0.5 * near), sector.window.px_per_tan),
     }
 }
 

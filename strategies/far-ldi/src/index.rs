@@ -38,7 +38,8 @@ pub struct Picture {
     pub deepest: u32,
     /// Pixels of a view a pixel of the image: above 1 where it was taken with less than the window's density.
     pub coarse: f32,
-    /// The most that rounding of depths moves a sample, for any eye of the cell, pixels.
+    /// A bound of how far rounding of depths moves a sample's image, pixels, for eyes of the cell that are at most half-way to the
+    /// nearest sample and look at it.
     pub rounding_px: f32,
 }
 

@@ -10,8 +10,8 @@
 //! pixel's ray and an element is given to every ray that meets it; images are culled by their own frustum, not by windows,
 //! since what the centre sees through one window may be seen through another by a viewer beside it.
 //!
-//! A window costs one picture a construction image, O(pixels * samples a pixel) to merge, and no more memory than one picture
-//! beside the result. Stored, a sample takes about two bytes (1.1 to 2.3 on scenes of pipes). Limits: the region must not meet far
+//! A window costs one picture a construction image, O(pixels * samples a pixel) to merge, and beside the result the memory of one
+//! picture and of all elements that their pictures see at a grazing angle. Stored, a sample takes about two bytes (1.1 to 2.3 on scenes of pipes). Limits: the region must not meet far
 //! chunks; surfaces that no construction image sees are missing, and so are one-sided ones that the centre sees past from behind:
 //! nothing is claimed; things thinner than a pixel are as broken as in a picture; at most 65,536 objects and 255 samples a pixel.
 
@@ -52,7 +52,8 @@ pub struct LayeredDepthImage {
     /// Average the warped picture over three by three pixels.
     #[serde(default)]
     pub smooth: bool,
-    /// The largest edge of an image; a window that needs more is taken with fewer pixels, which is reported.
+    /// The largest edge of an image; a window that needs more is taken with fewer pixels, which is reported. GPU backends take at most
+    /// 16.7 million samples an image, and as many as one storage binding holds, 16 bytes each.
     #[serde(default = "defaults::max_px")]
     #[schemars(range(min = 16, max = 16384), extend("unit" = "px"))]
     pub max_px: u32,
@@ -69,7 +70,7 @@ mod defaults {
         1.0
     }
     pub(super) fn max_px() -> u32 {
-        4096
+        2048
     }
 }
 

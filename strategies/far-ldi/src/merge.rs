@@ -16,7 +16,7 @@
 //! * Elements that their own picture sees at a grazing angle wait until all others are in, as points.
 //! * The same surface: with footprint f = depth / pixels a unit tangent and slope s = tan of the angle between normal and ray (that of
 //!   [`GRAZING`] at most), two samples no farther apart in depth than merge_px f (1 + s / 2), whose normals are less
-//!   than 73 degrees apart; or no farther apart than f, whatever their normals. A point: no farther than merge_px f.
+//!   than 73 degrees apart; or no farther apart than f (merge_px f where that is less), whatever their normals. A point: no farther than merge_px f.
 
 use farfield_core::Camera;
 use farfield_core::image::{SurfaceImage, from_octahedral};
@@ -150,7 +150,7 @@ impl Layers {
         let there = |there: &Sample| {
             let apart = (there.depth - s.depth).abs();
             let same = s.normal.dot(there.normal) > SAME;
-            apart <= footprint || (same && apart <= along.max(self.tolerance(there, ray)[1]))
+            apart <= footprint * self.merge_px.min(1.0) || (same && apart <= along.max(self.tolerance(there, ray)[1]))
         };
         if s.depth >= self.front[i] && !self.any(i, there) {
             self.push(i, s);

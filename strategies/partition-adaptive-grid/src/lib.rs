@@ -13,7 +13,8 @@
 //!   elsewhere in the inflated grid are served where a point's star-shape holds them, with the same promise.
 //! * The radius of a star-shape is computed from fields of view, pitches and the points there are (`star`), not fixed at two
 //!   spacings, so fields of view from 45 degrees are served; the paper's bound was 54. `find` turns to the next point where a
-//!   radius does not hold the eye.
+//!   radius does not hold the eye. Radii are sampled, with a margin: that every eye finds a point is tested, not proven; the budget
+//!   of the views that do is.
 //! * A range of pitches is cut into bins; each is budgeted for all views of the bin together. A fixed pitch is exact.
 //! * A cell's claim is of the views for which `find` gives it, with the split that `active` gives: a star-shape also holds eyes
 //!   whose reverse frustum does not hold the point, and these use another.
@@ -91,7 +92,7 @@ pub struct AdaptiveGrid {
     pub max_level: u32,
     /// Width of the bins of pitches, where the views have more than one.
     #[serde(default = "pitch_bin_deg")]
-    #[schemars(range(max = 90.0), extend("unit" = "deg", "exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 1.0, max = 90.0), extend("unit" = "deg"))]
     pub pitch_bin_deg: f32,
 }
 
@@ -163,8 +164,8 @@ impl AdaptiveGrid {
         if self.max_level > 16 {
             return wrong(format!("max_level = {} is above 16", self.max_level));
         }
-        if !(self.pitch_bin_deg > 0.0 && self.pitch_bin_deg <= 90.0) {
-            return wrong(format!("pitch_bin_deg = {} is not above 0 and up to 90", self.pitch_bin_deg));
+        if !(1.0..=90.0).contains(&self.pitch_bin_deg) {
+            return wrong(format!("pitch_bin_deg = {} is not within 1..=90", self.pitch_bin_deg));
         }
         Ok(())
     }
