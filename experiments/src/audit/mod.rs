@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 use farfield_core::backend::Backend;
 use farfield_core::camera::ViewModel;
-use farfield_core::cell::Cell;
+use farfield_core::cell::{Cell, Sector};
 use farfield_core::claim::{Claim, Quantity};
 use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind};
 use farfield_core::id::{AssetId, LocalPayload, ObjectId, TargetId};
@@ -107,7 +107,13 @@ impl CellAudit<'_> {
 
     /// The objects all of whose payloads claim a hole width: where one payload is silent, so is the object.
     fn objects(&self) -> Vec<Object> {
-        let cube = Camera::cube(self.cell.outline.centre.as_dvec3(), 16, self.views.near);
+        // All round, and along every window's axis: what is far may depend on the direction.
+        let centre = self.cell.outline.centre.as_dvec3();
+        let axis = |s: &Sector| {
+            let (yaw, pitch) = ((-s.window.axis.x).atan2(-s.window.axis.z), s.window.axis.y.clamp(-1.0, 1.0).asin());
+            self.views.camera(centre, yaw, pitch)
+        };
+        let around = Camera::cube(centre, 16, self.views.near).into_iter().chain(self.cell.sectors.iter().map(axis));
         let claimed: BTreeMap<LocalPayload, f64> = self
             .claims
             .iter()
@@ -115,7 +121,7 @@ impl CellAudit<'_> {
             .filter_map(|c| Some((c.payload?, c.max)))
             .collect();
         let mut by: BTreeMap<u32, (Aabb, Option<f64>)> = BTreeMap::new();
-        for d in cube.iter().flat_map(|c| (self.draws)(c)) {
+        for d in around.flat_map(|c| (self.draws)(&c)) {
             if let DrawWhat::Payload { id, object, .. } = d.what
                 && id.asset == self.asset
                 && object > 0
@@ -146,7 +152,7 @@ impl CellAudit<'_> {
     }
 
     fn hole_width(&self, backend: &mut dyn Backend, o: &Object, rng: &mut impl Rng) -> Result<Option<f64>, Fault> {
-        let Some((whole, camera)) = self.aimed(o.bounds, rng) else { return Ok(None) };
+        let Some((whole, camera)) = (0..SERVED_TRIES).find_map(|_| self.aimed(o.bounds, rng)) else { return Ok(None) };
         let own = ChunkSet::from_range(self.scene.objects[o.id.index()].chunks.clone());
         let split = self.cells.active(self.cell, &whole).split;
         let far = own.intersection(&self.cell.splits[split.index()].far);
