@@ -88,8 +88,6 @@ fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
 fn uses(folder: &str, words: &[&str]) -> Vec<String> {
     let mut files = vec![];
     sources(&root().join(folder), &mut files);
-    // By convention a module of tests in a file of its own is `tests.rs`.
-    files.retain(|f| f.file_name().is_none_or(|n| n != "tests.rs"));
     let mut found = vec![];
     for f in files {
         let text = std::fs::read_to_string(&f).expect("a source file");

@@ -264,6 +264,3 @@ fn tangents(views: &ViewModel) -> Result<[f64; 2], Fault> {
     let camera = views.camera(DVec3::ZERO, 0.0, 0.0);
     Ok([camera.right_tan, camera.top].map(|t| f64::from(t) * (1.0 + TAN_SLACK)))
 }
-
-#[cfg(test)]
-mod tests;

@@ -4,19 +4,23 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use farfield_core::Camera;
+use farfield_core::camera::ViewModel;
 use farfield_core::cell::Cell;
-use farfield_core::context::{Capture, Executor, Forget, Serial, Shot};
+use farfield_core::context::{Capture, Context, Executor, Forget, Serial, Shot};
 use farfield_core::id::{CellId, MaterialId, SplitId};
 use farfield_core::image::SurfaceImage;
 use farfield_core::mesh::TriangleMesh;
 use farfield_core::region::Region;
-use farfield_core::scene::{Material, PlacedChunk, Placement, SceneBuilder};
-use glam::{DAffine3, Vec3};
+use farfield_core::scene::{Material, PlacedChunk, Placement, Scene, SceneBuilder};
+use farfield_core::strategy::Partition;
+use farfield_core::{Camera, Fault};
+use farfield_partition_adaptive_grid::{AdaptiveGrid, Directions};
+use glam::{DAffine3, DVec3, Vec3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use super::*;
+/// The views that the partition budgets for are this much wider, relatively, than the view model's.
+const TAN_SLACK: f64 = 1e-6;
 
 struct Blind;
 
