@@ -24,6 +24,7 @@ pub mod image;
 pub mod layered;
 pub mod mesh;
 pub mod octree;
+pub mod panorama;
 pub mod path;
 pub mod payload;
 pub mod region;
