@@ -24,6 +24,8 @@ mod places;
 mod redundancy;
 mod samples;
 mod simplify;
+#[cfg(test)]
+mod tests;
 mod texels;
 mod tree;
 mod view;
