@@ -1,6 +1,7 @@
 //! Metrics: whether one viewpoint's samples serve a whole cell (visibility), and what collapsing an edge costs
 //! (simplification).
 
+pub mod candidates;
 mod quadric;
 mod self_occlusion;
 mod silhouette_weighted;
