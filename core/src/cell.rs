@@ -7,11 +7,11 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::Camera;
 use crate::claim::Claim;
 use crate::id::{CellId, SectorId, SplitId};
 use crate::region::Region;
-use crate::scene::ChunkSet;
+use crate::scene::{ChunkSet, Scene};
+use crate::{Camera, Fault};
 
 /// What is known of a cell before it is built.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -39,6 +39,28 @@ pub struct Cell {
     pub own: Vec<u8>,
     /// What the partition claims of frames in this cell.
     pub claims: Vec<Claim>,
+}
+
+impl Cell {
+    /// Whether some split has far chunks, for far fields that serve viewpoints beside what they show.
+    ///
+    /// # Errors
+    /// [`Fault::Refused`], in the name of the far field `who`, where a far chunk meets the cell's viewpoints.
+    pub fn has_far(&self, scene: &Scene, who: &str) -> Result<bool, Fault> {
+        let region = &self.outline.region;
+        for c in self.splits.iter().flat_map(|s| s.far.iter()) {
+            let chunk = &scene.chunks[c.index()];
+            let distance = region.distance(&chunk.bounds);
+            if distance.is_nan() || distance <= 0.0 {
+                return Err(Fault::Refused(format!(
+                    "{who}: a far part of object {} meets the viewpoints of cell {}: give the partition a region (or cells) \
+                     that the far geometry lies outside of, or take a far field that serves any viewpoint",
+                    chunk.object.0, self.outline.id.0
+                )));
+            }
+        }
+        Ok(self.splits.iter().any(|s| !s.far.is_empty()))
+    }
 }
 
 /// Which chunks are far; near is the rest.

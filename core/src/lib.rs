@@ -9,6 +9,7 @@
 //! [`context::Context`].
 
 pub mod aabb;
+pub mod atlas;
 pub mod backend;
 pub mod bvh;
 pub mod camera;

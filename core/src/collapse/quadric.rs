@@ -130,6 +130,15 @@ impl Quadrics {
         }
         Self { vertices, placement: settings.placement }
     }
+
+    /// What it costs that `from` dies onto `onto`'s place, whatever the placement is: the root mean square distance of that place to
+    /// the planes of `from`, in the positions' unit. Infinite where it is no number.
+    pub fn half_edge(&self, mesh: &LiveMesh, from: u32, onto: u32) -> f32 {
+        let [from, onto] = [from, onto].map(|v| &self.vertices[v as usize]);
+        let (q, x) = (from.quadric(), onto.position() - from.position());
+        let mean = (x.dot(q.times(x) + 2.0 * q.b) + q.c).max(0.0) / q.area.max(f32::MIN_POSITIVE);
+        if mean.is_finite() { mean.sqrt() / mesh.unit() } else { f32::INFINITY }
+    }
 }
 
 impl Cost for Quadrics {

@@ -7,7 +7,7 @@
 use farfield_core::registry::{Entry, Kind, settings_of};
 
 pub use {
-    farfield_far_baselines as far_baselines, farfield_far_ldi as far_ldi,
+    farfield_far_baselines as far_baselines, farfield_far_itdm as far_itdm, farfield_far_ldi as far_ldi,
     farfield_far_textured_mesh as far_textured_mesh, farfield_metrics as metrics,
     farfield_partition_adaptive_grid as partition_adaptive_grid, farfield_partition_hex as partition_hex,
     farfield_partition_single_cell as partition_single_cell, farfield_schedulers as schedulers,
@@ -30,6 +30,16 @@ macro_rules! placement {
     };
 }
 
+/// The paper of the incremental textured depth meshes, before a section's number.
+macro_rules! depth_meshes {
+    ($section:literal) => {
+        concat!(
+            "Simplifying complex environments using incremental textured depth meshes (Wilson, Manocha 2003), section ",
+            $section
+        )
+    };
+}
+
 /// Every strategy, by kind, then by name.
 pub fn registry() -> Vec<Entry> {
     vec![
@@ -42,10 +52,24 @@ pub fn registry() -> Vec<Entry> {
         },
         Entry {
             kind: Kind::FarField,
+            name: "incremental-tdm",
+            summary: "Panoramic samples as depth meshes, each with only what its ancestors have not seen",
+            source: depth_meshes!("3 and 4"),
+            settings: settings_of::<far_itdm::IncrementalTdm>(),
+        },
+        Entry {
+            kind: Kind::FarField,
             name: "layered-depth-image",
             summary: "What is far as pictures with several samples a pixel, warped to the eye",
             source: placement!("4"),
             settings: settings_of::<far_ldi::LayeredDepthImage>(),
+        },
+        Entry {
+            kind: Kind::FarField,
+            name: "textured-depth-mesh",
+            summary: "One panoramic sample as a depth mesh with its skins",
+            source: depth_meshes!("5.4, the baseline"),
+            settings: settings_of::<far_itdm::TexturedDepthMesh>(),
         },
         Entry {
             kind: Kind::FarField,

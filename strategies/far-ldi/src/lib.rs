@@ -98,22 +98,12 @@ impl LayeredDepthImage {
 ///
 /// An error where a far chunk meets the region, or where a split has far chunks and no window.
 fn has_far(cell: &Cell, scene: &Scene) -> Result<bool, Fault> {
-    let id = cell.outline.id.0;
+    cell.has_far(scene, "layered-depth-image")?;
     for (i, split) in cell.splits.iter().enumerate() {
-        for c in split.far.iter() {
-            let chunk = &scene.chunks[c.index()];
-            let distance = cell.outline.region.distance(&chunk.bounds);
-            if distance.is_nan() || distance <= 0.0 {
-                return Err(Fault::Refused(format!(
-                    "layered-depth-image: a far part of object {} meets the viewpoints of cell {id}: give the partition a region (or \
-                     cells) that the far geometry lies outside of, or take a far field that serves any viewpoint",
-                    chunk.object.0
-                )));
-            }
-        }
         if !split.far.is_empty() && cell.sectors.iter().all(|s| s.split.index() != i) {
             return Err(Fault::Refused(format!(
-                "layered-depth-image: split {i} of cell {id} has far chunks and no window to see them through"
+                "layered-depth-image: split {i} of cell {} has far chunks and no window to see them through",
+                cell.outline.id.0
             )));
         }
     }

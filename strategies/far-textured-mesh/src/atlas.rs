@@ -1,14 +1,10 @@
-//! Texels of captured views: what lies past outlines, and where they lie in the cell's atlases.
+//! Texels of captured views: what lies past outlines.
 //!
-//! *Dilation.* A simplified polygon reaches past the captured outline by a few pixels, and bilinear look-ups reach half a texel
+//! A simplified polygon reaches past the captured outline by a few pixels, and bilinear look-ups reach half a texel
 //! further: background texels take the colour and normal of the nearest captured one, ring by ring (breadth first), so that no look-up
-//! sees background. Their alpha stays 0.
-//!
-//! *Packing.* Rectangles go into layers of one size with etagere's shelves, tallest first within an object; all of an object's
-//! views are in one atlas, so that it depends on one payload. O(texels).
+//! sees background. Their alpha stays 0. O(texels).
 
-use etagere::{AtlasAllocator, size2};
-use farfield_core::Fault;
+use farfield_core::atlas::Slot;
 use farfield_core::image::{SurfaceImage, from_octahedral};
 use farfield_core::payload::AtlasPart;
 
@@ -54,87 +50,6 @@ pub(crate) fn texels(image: &SurfaceImage, rings: u32) -> Texels {
     out
 }
 
-/// Where a rectangle lies.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Slot {
-    /// Which atlas.
-    pub(crate) atlas: u32,
-    /// Its layer.
-    pub(crate) layer: u32,
-    /// x, y, width, height.
-    pub(crate) rect: [u32; 4],
-}
-
-/// Atlases for groups of rectangles: an atlas's side and number of layers each, and a slot for each rectangle.
-#[derive(Debug, Default, PartialEq)]
-pub(crate) struct Packing {
-    /// Side and layers.
-    pub(crate) atlases: Vec<(u32, u32)>,
-    /// By group, by rectangle.
-    pub(crate) slots: Vec<Vec<Slot>>,
-}
-
-/// Packs groups of rectangles; a group's are in one atlas. Atlases have sides of `side` texels, or of the next power of two
-/// that holds the largest rectangle, and about `max_layers` layers at most (a group is never divided).
-///
-/// # Errors
-/// [`Fault::Refused`] where a rectangle is larger than any device's textures.
-pub(crate) fn pack(groups: &[Vec<[u32; 2]>], side: u32, max_layers: u32) -> Result<Packing, Fault> {
-    let all = || groups.iter().flatten();
-    let largest = all().map(|s| s[0].max(s[1])).max().unwrap_or(0);
-    if largest > 16384 {
-        return Err(Fault::Refused(format!("textured-lod-mesh: a picture of {largest} pixels a side: lower density")));
-    }
-    let area: f64 = all().map(|s| f64::from(s[0]) * f64::from(s[1])).sum();
-    // No larger than what there is, no smaller than the largest.
-    let enough = ((area * 1.3).sqrt().ceil() as u32).next_power_of_two();
-    let side = side.next_power_of_two().min(enough).max(largest.next_power_of_two());
-    let mut out = Packing::default();
-    let mut layers: Vec<AtlasAllocator> = vec![];
-    for group in groups {
-        if group.is_empty() {
-            out.slots.push(vec![]);
-            continue;
-        }
-        if layers.len() as u32 >= max_layers || out.atlases.is_empty() {
-            layers.clear();
-            out.atlases.push((side, 0));
-        }
-        let atlas = out.atlases.len() as u32 - 1;
-        let mut order: Vec<usize> = (0..group.len()).collect();
-        order.sort_by_key(|&i| (std::cmp::Reverse(group[i][1]), i));
-        let mut slots = vec![Slot { atlas, layer: 0, rect: [0; 4] }; group.len()];
-        for i in order {
-            let [w, h] = group[i];
-            let size = size2(w as i32, h as i32);
-            let mut found = layers.iter_mut().enumerate().find_map(|(k, l)| Some((k, l.allocate(size)?)));
-            if found.is_none() {
-                layers.push(AtlasAllocator::new(size2(side as i32, side as i32)));
-                let k = layers.len() - 1;
-                found = layers[k].allocate(size).map(|a| (k, a));
-            }
-            let Some((k, a)) = found else {
-                return Err(Fault::Refused(format!(
-                    "textured-lod-mesh: {w} x {h} texels do not fit an atlas of {side}"
-                )));
-            };
-            let at = a.rectangle.min;
-            slots[i] = Slot { atlas, layer: k as u32, rect: [at.x as u32, at.y as u32, w, h] };
-        }
-        if let Some(last) = out.atlases.last_mut() {
-            last.1 = layers.len() as u32;
-        }
-        out.slots.push(slots);
-    }
-    Ok(out)
-}
-
-/// An empty atlas.
-pub(crate) fn blank(side: u32, layers: u32) -> AtlasPart {
-    let n = side as usize * side as usize * layers as usize;
-    AtlasPart { size: [side, side], layers, albedo: vec![[0; 4]; n], normal: vec![[128, 128, 128, 0]; n] }
-}
-
 /// Copies texels to their slot.
 pub(crate) fn write(atlas: &mut AtlasPart, slot: &Slot, texels: &Texels) {
     let [x, y, w, h] = slot.rect.map(|v| v as usize);
@@ -151,33 +66,6 @@ mod tests {
     use super::*;
     use farfield_core::image::octahedral;
     use glam::Vec3;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn rectangles_lie_in_their_layer_and_never_on_each_other(
-            groups in prop::collection::vec(prop::collection::vec((1u32..300, 1u32..300), 0..7), 0..40), max_layers in 1u32..4
-        ) {
-            let groups: Vec<Vec<[u32; 2]>> =
-                groups.into_iter().map(|g| g.into_iter().map(|(w, h)| [w, h]).collect()).collect();
-            let p = pack(&groups, 512, max_layers).unwrap();
-            let mut placed: Vec<Slot> = vec![];
-            for (group, slots) in groups.iter().zip(&p.slots) {
-                prop_assert_eq!(group.len(), slots.len());
-                prop_assert!(slots.windows(2).all(|s| s[0].atlas == s[1].atlas));
-                for (size, s) in group.iter().zip(slots) {
-                    let (side, layers) = p.atlases[s.atlas as usize];
-                    prop_assert_eq!([s.rect[2], s.rect[3]], *size);
-                    prop_assert!(s.layer < layers && s.rect[0] + s.rect[2] <= side && s.rect[1] + s.rect[3] <= side);
-                    for o in placed.iter().filter(|o| (o.atlas, o.layer) == (s.atlas, s.layer)) {
-                        let apart = |k: usize| s.rect[k] + s.rect[k + 2] <= o.rect[k] || o.rect[k] + o.rect[k + 2] <= s.rect[k];
-                        prop_assert!(apart(0) || apart(1));
-                    }
-                    placed.push(*s);
-                }
-            }
-        }
-    }
 
     #[test]
     fn background_takes_the_nearest_texel_ring_by_ring_and_stays_background() {

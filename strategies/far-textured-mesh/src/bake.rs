@@ -2,17 +2,18 @@
 
 use std::collections::BTreeMap;
 
+use farfield_core::atlas::{blank, pack};
 use farfield_core::claim::{Claim, Quantity};
 use farfield_core::context::{Context, collect};
 use farfield_core::id::{ChunkId, LocalPayload, ObjectId};
 use farfield_core::payload::{Part, Payload, ProjectedPart, Projector};
 use farfield_core::scene::ChunkSet;
 use farfield_core::strategy::{CellJob, LeftOut, Sink};
-use farfield_core::{Aabb, Camera, Fault};
-use glam::{Mat4, Vec3};
+use farfield_core::{Aabb, Fault};
+use glam::Vec3;
 
 use crate::TexturedLodMesh;
-use crate::atlas::{Slot, blank, pack, write};
+use crate::atlas::write;
 use crate::index::{Atlas, Entry, Index};
 use crate::mesh::{Baked, simplify};
 use crate::object::Piece;
@@ -66,7 +67,7 @@ pub(crate) fn bake(
             .views
             .iter()
             .zip(slots)
-            .map(|(v, slot)| projector(&v.camera, v.offset, slot, atlas_id(slot.atlas)))
+            .map(|(v, slot)| slot.projector(&v.camera, [0; 2], v.offset, atlas_id(slot.atlas)))
             .collect();
         let (hole_px, error_px, size_px) = (b.hole_px, b.error_px, b.size_px);
         let payload = payload(b, &projectors);
@@ -167,44 +168,4 @@ fn mesh_bytes(p: &Payload) -> u64 {
             Part::Atlas(_) | Part::Layered(_) => 0,
         })
         .sum()
-}
-
-/// The projector of a view. With v = p + offset (from the eye) and z = v . forward the picture has
-///
-/// ```text
-/// x = ((v . right) / z - left) sx,   sx = width / (right_tan - left)      pixels from the left
-/// y = (top - (v . up) / z) sy,       sy = height / (top - bottom)         pixels from the top
-/// ```
-///
-/// and texels are pixels moved by the rectangle's corner; all rows are multiplied by z, which is w.
-pub(crate) fn projector(c: &Camera, offset: Vec3, slot: &Slot, atlas: LocalPayload) -> Projector {
-    let [x, y, w, h] = slot.rect.map(|v| v as f32);
-    let (sx, sy) = (w / (c.right_tan - c.left), h / (c.top - c.bottom));
-    let row_u = c.right * sx + c.forward * (x - c.left * sx);
-    let row_v = c.forward * (y + c.top * sy) - c.up * sy;
-    let row = |r: Vec3| r.extend(r.dot(offset));
-    let matrix = Mat4::from_cols(row(row_u), row(row_v), row(c.forward), row(c.forward)).transpose();
-    Projector { matrix, eye: -offset, atlas, layer: slot.layer, rect: slot.rect }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use glam::DVec3;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn a_projector_sends_a_point_to_the_texel_of_its_pixel(p in [-3f32..3.0, -3f32..3.0, -3f32..3.0]) {
-            let p = Vec3::from(p);
-            let eye = DVec3::new(20.0, 4.0, -11.0);
-            let corners = Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) }.corners();
-            let c = Camera::around(eye, -eye.as_vec3(), corners, 300.0, 2, 0.1).unwrap();
-            let slot = Slot { atlas: 0, layer: 3, rect: [100, 40, c.size[0], c.size[1]] };
-            let q = projector(&c, (-eye).as_vec3(), &slot, LocalPayload(9));
-            let (t, px) = (q.matrix * p.extend(1.0), c.project(p - eye.as_vec3()).unwrap());
-            prop_assert!((t.x / t.w - 100.0 - px.x).abs() < 0.01 && (t.y / t.w - 40.0 - px.y).abs() < 0.01);
-            prop_assert!((t.w - px.z).abs() < 1e-3 && (t.z - px.z).abs() < 1e-3);
-        }
-    }
 }

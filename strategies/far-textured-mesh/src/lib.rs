@@ -42,6 +42,8 @@ pub use category::DepthMeasure;
 pub use facing::Facing;
 pub use polygon::PolygonViews;
 
+const NAME: &str = "textured-lod-mesh";
+
 /// Textured LOD meshes.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -260,29 +262,12 @@ impl TexturedLodMesh {
     }
 }
 
-/// Whether a cell has far chunks; an error where one of them meets its region.
-fn has_far(cell: &Cell, scene: &Scene) -> Result<bool, Fault> {
-    let region = &cell.outline.region;
-    for c in cell.splits.iter().flat_map(|s| s.far.iter()) {
-        let chunk = &scene.chunks[c.index()];
-        let distance = region.distance(&chunk.bounds);
-        if distance.is_nan() || distance <= 0.0 {
-            return Err(Fault::Refused(format!(
-                "textured-lod-mesh: a far part of object {} meets the viewpoints of cell {}: give the partition a region (or cells) \
-                 that the far geometry lies outside of, or take a far field that serves any viewpoint",
-                chunk.object.0, cell.outline.id.0
-            )));
-        }
-    }
-    Ok(cell.splits.iter().any(|s| !s.far.is_empty()))
-}
-
 #[typetag::serde(name = "textured-lod-mesh")]
 impl FarField for TexturedLodMesh {
     fn needs(&self, scene: &Scene, cell: Option<&Cell>) -> Result<Needs, Fault> {
         self.check()?;
         let work = match cell {
-            Some(cell) => has_far(cell, scene)?,
+            Some(cell) => cell.has_far(scene, NAME)?,
             None => !scene.chunks.is_empty(),
         };
         let left_out =
@@ -306,7 +291,7 @@ impl FarField for TexturedLodMesh {
 
     fn bake_cell(&self, job: &CellJob<'_>, out: &dyn Sink, cx: &Context<'_>) -> Result<Vec<u8>, Fault> {
         self.check()?;
-        if !has_far(job.cell, job.scene)? {
+        if !job.cell.has_far(job.scene, NAME)? {
             return Ok(vec![]);
         }
         bake::bake(self, job, out, cx)

@@ -1,0 +1,62 @@
+//! The dense mesh of a sample: two triangles for each pixel that is kept.
+//!
+//! Follows Wilson and Manocha 2003, section 4.2.1. Pixels of one surface share their corners, over the faces of the cube too, so that the
+//! mesh is one: its edges are open where surfaces end and where points were left to an ancestor. O(pixels).
+
+use farfield_core::panorama::{NONE, Panorama, Surface};
+use glam::Vec3;
+
+/// A mesh around a sample's eye.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Dense {
+    /// Relative to the eye.
+    pub(crate) positions: Vec<Vec3>,
+    /// Counter-clockwise seen from the eye.
+    pub(crate) indices: Vec<u32>,
+    /// For each triangle the picture that shows it.
+    pub(crate) views: Vec<u8>,
+    /// For each vertex the pictures of its triangles, a bit each: more than one on the edges of the cube.
+    pub(crate) views_of: Vec<u8>,
+}
+
+impl Dense {
+    /// The mesh of the pixels that `keep` says.
+    pub(crate) fn new(p: &Panorama<'_>, surface: &Surface, keep: &[bool]) -> Self {
+        let mut out = Self::default();
+        let mut own = vec![NONE; surface.points.len()];
+        for view in 0..p.views().len() {
+            for pixel in p.of_view(view) {
+                let quad = surface.quads[pixel as usize];
+                if !keep[pixel as usize] || quad[0] == NONE {
+                    continue;
+                }
+                let [tl, tr, br, bl] = quad.map(|v| out.vertex(&mut own, surface, v, view as u8));
+                let at = |v: u32| out.positions[v as usize];
+                // Along the shorter diagonal.
+                let two = if at(tl).distance_squared(at(br)) <= at(tr).distance_squared(at(bl)) {
+                    [tl, bl, br, tl, br, tr]
+                } else {
+                    [tr, tl, bl, tr, bl, br]
+                };
+                out.indices.extend(two);
+                out.views.extend([view as u8; 2]);
+            }
+        }
+        out
+    }
+
+    fn vertex(&mut self, own: &mut [u32], surface: &Surface, v: u32, view: u8) -> u32 {
+        let id = &mut own[v as usize];
+        if *id == NONE {
+            *id = self.positions.len() as u32;
+            self.positions.push(surface.points[v as usize]);
+            self.views_of.push(0);
+        }
+        self.views_of[*id as usize] |= 1 << view;
+        *id
+    }
+
+    pub(crate) fn triangles(&self) -> usize {
+        self.views.len()
+    }
+}
