@@ -5,7 +5,9 @@ pub mod candidates;
 mod quadric;
 mod self_occlusion;
 mod silhouette_weighted;
+mod void_surface;
 
 pub use quadric::Quadric;
 pub use self_occlusion::SelfOcclusion;
 pub use silhouette_weighted::{Normals, SilhouetteWeighted};
+pub use void_surface::{Candidates, Unseen, VoidSurface, Voids};
