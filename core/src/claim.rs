@@ -13,6 +13,8 @@ pub enum Quantity {
     HoleWidthPx,
     /// Original triangles drawn in a frame.
     NearTriangles,
+    /// Solid angle in which a viewpoint sees what no sample saw, steradians.
+    UnseenSolidAngle,
 }
 
 impl Quantity {
@@ -21,6 +23,7 @@ impl Quantity {
         match self {
             Self::HoleWidthPx => "hole_width_px",
             Self::NearTriangles => "near_triangles",
+            Self::UnseenSolidAngle => "unseen_solid_angle_sr",
         }
     }
 }

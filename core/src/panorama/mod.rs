@@ -4,12 +4,13 @@
 //! well. Pixels are numbered through all its pictures, and a pixel has eight neighbours, across the edges of the cube too
 //! (seven at its corners). [`Joined`] says which neighbours belong to one surface and which edges are *skins*; [`Surface`]
 //! covers every pixel's solid angle with a quadrilateral that joins its neighbours' without seams, and stands *walls* where a skin
-//! is; [`pixel_solid_angle_sr`] weighs a pixel.
+//! is; [`pixel_solid_angle_sr`] weighs a pixel; [`raster`] draws all that as it is seen from elsewhere.
 //!
 //! Follows Wilson and Manocha ("Simplifying complex environments using incremental textured depth meshes", 2003, sections 3.3 and
 //! 4.2.1). All positions are relative to the panorama's eye, so that they keep their precision wherever it stands.
 
 mod joined;
+pub mod raster;
 mod solid_angle;
 mod surface;
 #[cfg(test)]

@@ -78,7 +78,7 @@ impl Measured {
 fn resolution(q: Quantity) -> f64 {
     match q {
         Quantity::HoleWidthPx => 1.0,
-        Quantity::NearTriangles => 0.0,
+        Quantity::NearTriangles | Quantity::UnseenSolidAngle => 0.0,
     }
 }
 
@@ -98,7 +98,7 @@ impl CellAudit<'_> {
             let measured = match (quantity, object) {
                 (Quantity::NearTriangles, _) => self.near_triangles(&mut rng),
                 (Quantity::HoleWidthPx, Some(object)) => self.hole_width(backend, object, &mut rng)?,
-                (Quantity::HoleWidthPx, None) => None,
+                (Quantity::HoleWidthPx, None) | (Quantity::UnseenSolidAngle, _) => None,
             };
             out.extend(measured.map(|measured| Measured { quantity: *quantity, claimed: *claimed, measured }));
         }
@@ -233,7 +233,7 @@ pub fn join(claimant: &str, measured: &[Measured]) -> Vec<BoundAudit> {
                     Quantity::HoleWidthPx => {
                         "a sample violates its own claim when it exceeds it by more than one pixel".into()
                     }
-                    Quantity::NearTriangles => String::new(),
+                    Quantity::NearTriangles | Quantity::UnseenSolidAngle => String::new(),
                 },
             }
         })
