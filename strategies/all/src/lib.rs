@@ -10,7 +10,8 @@ pub use {
     farfield_far_baselines as far_baselines, farfield_far_ldi as far_ldi,
     farfield_far_textured_mesh as far_textured_mesh, farfield_metrics as metrics,
     farfield_partition_adaptive_grid as partition_adaptive_grid, farfield_partition_hex as partition_hex,
-    farfield_partition_single_cell as partition_single_cell, farfield_schedulers as schedulers,
+    farfield_partition_octree as partition_octree, farfield_partition_single_cell as partition_single_cell,
+    farfield_schedulers as schedulers,
 };
 
 /// The paper of the textured LOD meshes, before a section's number.
@@ -25,6 +26,16 @@ macro_rules! placement {
     ($section:literal) => {
         concat!(
             "Automatic image placement to provide a guaranteed frame rate (Aliaga, Lastra 1999), section ",
+            $section
+        )
+    };
+}
+
+/// The paper of the incremental textured depth meshes, before a section's number.
+macro_rules! incremental {
+    ($section:literal) => {
+        concat!(
+            "Simplifying complex environments using incremental textured depth meshes (Wilson, Manocha 2003), section ",
             $section
         )
     };
@@ -67,6 +78,13 @@ pub fn registry() -> Vec<Entry> {
             summary: "Hexagonal cells of viewpoints on the ground plane, six windows each",
             source: textured!("3.1.1"),
             settings: settings_of::<partition_hex::HexCells>(),
+        },
+        Entry {
+            kind: Kind::Partition,
+            name: "octree-regions",
+            summary: "Cubes of an octree, as large as a number of triangles inside allows",
+            source: incremental!("3.1.1 and 5.1"),
+            settings: settings_of::<partition_octree::OctreeRegions>(),
         },
         Entry {
             kind: Kind::Partition,
