@@ -60,6 +60,13 @@ pub fn registry() -> Vec<Entry> {
         },
         Entry {
             kind: Kind::FarField,
+            name: "static-lod",
+            summary: "A chain of discrete levels of detail an object, chosen by projected error",
+            source: incremental!("5.4, its baseline"),
+            settings: settings_of::<far_baselines::StaticLod>(),
+        },
+        Entry {
+            kind: Kind::FarField,
             name: "textured-lod-mesh",
             summary: "Distant objects as small meshes that wear pictures of themselves",
             source: textured!("3.1.2-3.1.5 and 3.2"),
