@@ -13,6 +13,9 @@ pub enum Quantity {
     HoleWidthPx,
     /// Original triangles drawn in a frame.
     NearTriangles,
+    /// Far surfaces that a viewpoint should see and does not, over the whole sphere of directions, steradians.
+    #[serde(rename = "unseen_solid_angle_sr")]
+    UnseenSolidAngle,
 }
 
 impl Quantity {
@@ -21,6 +24,7 @@ impl Quantity {
         match self {
             Self::HoleWidthPx => "hole_width_px",
             Self::NearTriangles => "near_triangles",
+            Self::UnseenSolidAngle => "unseen_solid_angle_sr",
         }
     }
 }
