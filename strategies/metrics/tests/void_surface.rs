@@ -8,11 +8,16 @@ use farfield_core::strategy::VisibilityMetric;
 use farfield_metrics::{Candidates, VoidSurface};
 use glam::Vec3;
 
-const PX: u32 = 96;
+/// Edge of the faces in which the void is counted; samples have four times as many pixels, since a surface that a sample saw at a
+/// grazing angle is known in longer steps.
+const PX: u32 = 64;
+
+/// The solid angle of a pixel in the middle of a face: (2 / PX)^2.
+const PIXEL_SR: f64 = 1e-3;
 
 /// F of a viewpoint beside what rays find.
 fn look(world: &World, samples: &[Vec3], from: Vec3) -> Compared {
-    let pictures = world.samples(samples, 2 * PX);
+    let pictures = world.samples(samples, 4 * PX);
     let found = world.voids(&pictures).unseen(world.local(from), PX, world.near());
     let c = compare(&found, &world.truly_unseen(from, samples, PX), PX);
     println!("{samples:?} from {from}: {c:?}");
@@ -22,8 +27,8 @@ fn look(world: &World, samples: &[Vec3], from: Vec3) -> Compared {
 /// F equals the count within the perimeter of the region times the size of a pixel of the picture (and half of one of the
 /// sample), and no pixel is wrong but along that border.
 fn agrees(c: Compared) {
-    assert!((c.sr - c.true_sr).abs() <= 1.5 * c.border_sr + 1e-4, "{c:?}");
-    assert!(c.apart_sr <= 0.1 * c.border_sr + 1e-4, "{c:?}");
+    assert!((c.sr - c.true_sr).abs() <= c.border_sr + PIXEL_SR, "{c:?}");
+    assert!(c.apart_sr <= 0.1 * c.border_sr + PIXEL_SR, "{c:?}");
 }
 
 #[test]
@@ -42,10 +47,12 @@ fn behind_a_wall_with_a_gap_rays_find_the_same_in_all_four_cases() {
     agrees(c);
     assert!(c.true_sr > 0.01);
     // (d) V beyond the critical line: nothing but void behind the gap.
-    let d = look(&world, &[Vec3::new(-6.0, 0.0, -3.5)], Vec3::new(6.0, 0.0, -3.5));
+    let d = look(&world, &[Vec3::new(-4.0, 0.0, -2.5)], Vec3::new(4.0, 0.0, -2.5));
     agrees(d);
-    let whole = look(&world, &[Vec3::new(-7.9, 3.9, -4.99)], Vec3::new(6.0, 0.0, -3.5));
-    assert!((d.true_sr / whole.true_sr - 1.0).abs() < 0.05, "the gap is full of void");
+    let corner = Vec3::new(-7.9, 3.9, -4.99);
+    let gap = world.truly_unseen(Vec3::new(4.0, 0.0, -2.5), &[corner], PX);
+    let truth = world.truly_unseen(Vec3::new(4.0, 0.0, -2.5), &[Vec3::new(-4.0, 0.0, -2.5)], PX);
+    assert_eq!(truth, gap, "the gap is full of void, as for a sample that sees nothing through it");
 }
 
 #[test]
@@ -58,7 +65,8 @@ fn with_several_samples_rays_find_what_none_of_them_saw() {
     agrees(two);
     assert!(two.true_sr < one.true_sr && two.sr < one.sr);
     let world = World::new(&furnished(), 1.0);
-    let around = [[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [-3.0, 3.0], [0.0, 0.5]].map(|p| Vec3::new(p[0], 0.0, p[1]));
+    // None of them sees a block's side at less than the angle of the second test.
+    let around = [[-2.6, -2.2], [2.6, -2.4], [2.4, 2.6], [-2.8, 2.4], [0.0, 0.5]].map(|p| Vec3::new(p[0], 0.0, p[1]));
     for n in [1, 2, 4, 5] {
         for from in [Vec3::new(0.2, 0.1, -2.5), Vec3::new(2.0, -0.3, 1.0)] {
             agrees(look(&world, &around[..n], from));
@@ -166,12 +174,12 @@ fn one_picture_of_one_object_serves_a_far_cell_and_not_a_near_one() {
         let corners = world.bounds.corners();
         let camera = farfield_core::Camera::around(eye, -Vec3::Z, corners, 200.0, 2, world.near()).unwrap();
         let pictures = world.shoot(&[camera]);
-        let cell = world.cell(centre, 1.0, true);
+        let cell = world.cell(centre, 2.5, true);
         let subject = world.subject(&cell, &views, &pictures);
         let metric = VoidSurface { max_sr: 1e-3, ..VoidSurface::default() };
         world.with(1, |cx| metric.judge(&subject, cx)).unwrap()
     };
-    let (near, far) = (value(3.0), value(100.0));
+    let (near, far) = (value(4.0), value(200.0));
     assert!(near.value > 0.01 && !near.passes, "{near:?}");
     assert!(far.value < 1e-3 && far.passes, "{far:?}");
 }

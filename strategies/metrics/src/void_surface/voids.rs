@@ -141,7 +141,10 @@ fn solid_angle(face: &Camera, mask: &[bool]) -> f64 {
     let [w, h] = face.size;
     let weights: Vec<f64> =
         (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| pixel_solid_angle_sr(face, x, y)).collect();
-    mask.chunks(weights.len()).flat_map(|m| m.iter().zip(&weights)).filter(|(m, _)| **m).map(|(_, w)| w).sum()
+    mask.chunks(weights.len())
+        .flat_map(|m| m.iter().zip(&weights))
+        .filter(|(m, _)| **m)
+        .fold(0.0, |sum, (_, w)| sum + w)
 }
 
 impl Sample {

@@ -77,7 +77,7 @@ impl World {
         }
         m.sections = vec![(0..m.indices.len() as u32, MaterialId(0))];
         let mut b = SceneBuilder::default();
-        b.materials.push(Material::default());
+        b.materials.push(Material { two_sided: true, ..Material::default() });
         let bvh = TriangleBvh::build(&m.positions, &m.indices);
         let mesh = b.mesh("room", m).unwrap();
         b.place(Placement { mesh, transform: DAffine3::IDENTITY });
