@@ -19,6 +19,6 @@ mod tree;
 mod triangles;
 
 pub use boxes::BoxBvh;
-pub use nearest::Nearest;
+pub use nearest::{Nearest, nearest_on_triangle};
 pub use ray::Ray;
 pub use triangles::{Hit, TriangleBvh};

@@ -11,7 +11,7 @@ use crate::claim::Claim;
 use crate::id::{CellId, SectorId, SplitId};
 use crate::region::Region;
 use crate::scene::{ChunkSet, Scene};
-use crate::{Camera, Fault};
+use crate::{Aabb, Camera, Fault};
 
 /// What is known of a cell before it is built.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -94,6 +94,25 @@ pub struct Window {
     pub px_per_tan: f32,
 }
 
+impl Window {
+    /// The six faces of a box with their outward normals, in the order +x -x +y -y +z -z; corners are the box's own, counter-clockwise
+    /// seen from outside.
+    pub fn faces(b: &Aabb, px_per_tan: f32) -> [Self; 6] {
+        [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z].map(|axis| {
+            let up = if axis.y == 0.0 { Vec3::Y } else { Vec3::Z };
+            let side = up.cross(axis);
+            let at = |(s, u): (f32, f32)| Vec3::select((axis + side * s + up * u).cmpgt(Vec3::ZERO), b.max, b.min);
+            Self { axis, corners: [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(at), px_per_tan }
+        })
+    }
+
+    /// Whether a box has a point beyond the window's plane: what a ray that leaves through the window can meet.
+    pub fn is_before(&self, b: &Aabb) -> bool {
+        let out = Vec3::select(self.axis.cmpge(Vec3::ZERO), b.max, b.min);
+        (out - self.corners[0]).as_dvec3().dot(self.axis.as_dvec3()) > 0.0
+    }
+}
+
 /// What a camera uses of a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Active {
@@ -128,10 +147,45 @@ pub fn sees(camera: &Camera, window: &Window) -> bool {
     true
 }
 
+/// Whether a camera's eye stands in a window's plane (nearer to it than `slack`, scene units) or past it, and some ray of the
+/// picture leads outwards: the window is looked through there, although clipping it against the frustum decides nothing.
+pub fn leaves_at_once(camera: &Camera, window: &Window, slack: f64) -> bool {
+    let inside = window.axis.as_dvec3().dot(window.corners[0].as_dvec3() - camera.eye);
+    let [w, h] = camera.size.map(|n| n as f32);
+    // A linear function is largest over a picture in one of its corners.
+    inside <= slack
+        && [(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].iter().any(|&(x, y)| camera.ray(x, y).dot(window.axis) > 0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use glam::DVec3;
+
+    #[test]
+    fn the_faces_of_a_box_look_outwards_and_close_it() {
+        let b = Aabb { min: Vec3::new(-1.0, 0.0, 2.0), max: Vec3::new(3.0, 1.0, 7.0) };
+        let faces = Window::faces(&b, 50.0);
+        for w in &faces {
+            let [p, q, r, _] = w.corners;
+            assert!((q - p).cross(r - q).normalize().distance(w.axis) < 1e-6);
+            assert!(w.corners.iter().all(|c| b.contains(*c) && w.axis.dot(*c) >= w.axis.dot(b.centre())));
+            assert!(!w.is_before(&b));
+            assert!(w.is_before(&Aabb { min: b.min + w.axis * 0.1, max: b.max + w.axis * 0.1 }));
+        }
+        let area = |w: &Window| (w.corners[1] - w.corners[0]).length() * (w.corners[2] - w.corners[1]).length();
+        assert_eq!(faces.iter().map(area).sum::<f32>(), 2.0 * (4.0 + 5.0 + 20.0));
+    }
+
+    #[test]
+    fn an_eye_in_a_window_looks_through_it_exactly_when_it_looks_outwards() {
+        let face = &Window::faces(&Aabb { min: -Vec3::ONE, max: Vec3::ONE }, 50.0)[0];
+        let at = |x: f64, forward: Vec3| {
+            leaves_at_once(&Camera::looking(DVec3::X * x, forward, Vec3::Y, 1.0, [9, 9], 0.1), face, 1e-4)
+        };
+        assert!(at(1.0, Vec3::X) && at(1.0, Vec3::new(0.1, 0.0, 1.0)) && at(1.001, Vec3::X));
+        assert!(!at(1.0, -Vec3::X) && !at(0.9, Vec3::X));
+    }
 
     #[test]
     fn a_window_is_seen_ahead_and_not_behind_or_beside() {

@@ -16,7 +16,11 @@ use farfield_integration_tests::stones;
 const GIVEN: [(&str, &str, &str); 2] = [("adaptive-grid", "budget", "6000"), ("hex-cells", "edge", "3.0")];
 
 /// More than the defaults: partitions that make a far field do something else.
-const VARIANTS: [(&str, &str); 1] = [("single-cell", "region = [-8.0, 1.0, -1.0, -4.0, 2.0, 1.0]")];
+const VARIANTS: [(&str, &str); 3] = [
+    ("octree-regions", "max_triangles = 2000, min_size = 3.0"),
+    ("octree-regions", "max_triangles = 2000, max_size = 4.0, three_dimensional = true"),
+    ("single-cell", "region = [-8.0, 1.0, -1.0, -4.0, 2.0, 1.0]"),
+];
 
 /// Far fields whose defaults are meant for larger pictures than these.
 const FITTED: [(&str, &str); 1] = [("textured-lod-mesh", "edge_px = 1.0")];

@@ -42,7 +42,7 @@ impl TriangleBvh {
 
 /// The point of a triangle nearest to `p` and its weights: the foot of the perpendicular where that lies inside, else the nearest
 /// point of the three sides. Triangles without area are their sides.
-fn nearest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> (DVec3, [f64; 3]) {
+pub fn nearest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> (DVec3, [f64; 3]) {
     let n = (b - a).cross(c - a);
     let n2 = n.length_squared();
     if n2 > 0.0 && n2.is_finite() {

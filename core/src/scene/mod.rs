@@ -7,10 +7,12 @@
 mod builder;
 mod chunk_set;
 mod cut;
+mod looks;
 
 pub use builder::{Placement, SceneBuilder};
 pub use chunk_set::ChunkSet;
 pub use cut::{CutMesh, MAX_CHUNK_TRIANGLES, cut};
+pub use looks::{normal_matrix, texture_at, vertex_albedo, vertex_tint};
 
 use std::ops::Range;
 

@@ -106,7 +106,12 @@ impl Site<'_> {
         let failed = |f| Failure::during(format!("pipeline \"{}\"", pipeline.name), f);
         let start = Instant::now();
         let scene_needs = pipeline.far_field.needs(self.scene, None).map_err(failed)?;
-        let shared = if scene_needs.scene_asset { Some(self.scene_asset(pipeline).map_err(failed)?) } else { None };
+        let (shared, shared_is_new) = if scene_needs.scene_asset {
+            let (key, manifest, new) = self.scene_asset(pipeline).map_err(failed)?;
+            (Some((key, manifest)), new)
+        } else {
+            (None, false)
+        };
         let needed = match pipeline.build {
             BuildWhen::Ahead => division.needed.as_slice(),
             BuildWhen::OnDemand => &[],
@@ -141,7 +146,7 @@ impl Site<'_> {
         let bytes = |m: &Manifest| m.bytes() + m.index.len() as u64;
         let shared_bytes = shared.as_ref().map_or(0, |s| bytes(&s.1));
         let preprocess = Preprocess {
-            seconds: if cells_built > 0 { start.elapsed().as_secs_f64() } else { 0.0 },
+            seconds: if cells_built > 0 || shared_is_new { start.elapsed().as_secs_f64() } else { 0.0 },
             cells_built,
             cells_needed: division.needed.len(),
             cells_total: division.cells.outlines().len(),
@@ -159,12 +164,13 @@ impl Site<'_> {
         manifest.payloads.values().all(|p| self.store.check(&p.key).is_some()).then_some(manifest)
     }
 
-    fn scene_asset(&self, pipeline: &Pipeline) -> Result<(Key, Manifest), Fault> {
+    /// What all cells share, and whether it was built just now.
+    fn scene_asset(&self, pipeline: &Pipeline) -> Result<(Key, Manifest, bool), Fault> {
         let settings = &pipeline.resolved["far_field"];
         let base = self.base("scene asset", settings, pipeline.far_field.version())?;
         let asset = key("scene asset", &[&base, self.capture.identity().as_bytes()]);
         if let Some(known) = self.whole(&asset) {
-            return Ok((asset, known));
+            return Ok((asset, known, false));
         }
         let sink = Recorder::new(self.store, asset);
         let memo = self.memo();
@@ -173,7 +179,7 @@ impl Site<'_> {
             &sink,
             &self.context(&memo),
         )?;
-        Ok((asset, sink.finish(index)?))
+        Ok((asset, sink.finish(index)?, true))
     }
 
     /// One cell, with what it needs, and whether it was built just now.

@@ -10,7 +10,8 @@ pub use {
     farfield_far_baselines as far_baselines, farfield_far_itdm as far_itdm, farfield_far_ldi as far_ldi,
     farfield_far_textured_mesh as far_textured_mesh, farfield_metrics as metrics,
     farfield_partition_adaptive_grid as partition_adaptive_grid, farfield_partition_hex as partition_hex,
-    farfield_partition_single_cell as partition_single_cell, farfield_schedulers as schedulers,
+    farfield_partition_octree as partition_octree, farfield_partition_single_cell as partition_single_cell,
+    farfield_schedulers as schedulers,
 };
 
 /// The paper of the textured LOD meshes, before a section's number.
@@ -31,7 +32,7 @@ macro_rules! placement {
 }
 
 /// The paper of the incremental textured depth meshes, before a section's number.
-macro_rules! depth_meshes {
+macro_rules! incremental {
     ($section:literal) => {
         concat!(
             "Simplifying complex environments using incremental textured depth meshes (Wilson, Manocha 2003), section ",
@@ -54,7 +55,7 @@ pub fn registry() -> Vec<Entry> {
             kind: Kind::FarField,
             name: "incremental-tdm",
             summary: "Panoramic samples as depth meshes, each with only what its ancestors have not seen",
-            source: depth_meshes!("3 and 4"),
+            source: incremental!("3 and 4"),
             settings: settings_of::<far_itdm::IncrementalTdm>(),
         },
         Entry {
@@ -66,9 +67,16 @@ pub fn registry() -> Vec<Entry> {
         },
         Entry {
             kind: Kind::FarField,
+            name: "static-lod",
+            summary: "A chain of discrete levels of detail an object, chosen by projected error",
+            source: incremental!("5.4, its baseline"),
+            settings: settings_of::<far_baselines::StaticLod>(),
+        },
+        Entry {
+            kind: Kind::FarField,
             name: "textured-depth-mesh",
             summary: "One panoramic sample as a depth mesh with its skins",
-            source: depth_meshes!("5.4, the baseline"),
+            source: incremental!("5.4, the baseline"),
             settings: settings_of::<far_itdm::TexturedDepthMesh>(),
         },
         Entry {
@@ -91,6 +99,13 @@ pub fn registry() -> Vec<Entry> {
             summary: "Hexagonal cells of viewpoints on the ground plane, six windows each",
             source: textured!("3.1.1"),
             settings: settings_of::<partition_hex::HexCells>(),
+        },
+        Entry {
+            kind: Kind::Partition,
+            name: "octree-regions",
+            summary: "Cubes of an octree, as large as a number of triangles inside allows",
+            source: incremental!("3.1.1 and 5.1"),
+            settings: settings_of::<partition_octree::OctreeRegions>(),
         },
         Entry {
             kind: Kind::Partition,

@@ -24,6 +24,8 @@ mod places;
 mod redundancy;
 mod samples;
 mod simplify;
+#[cfg(test)]
+mod tests;
 mod texels;
 mod tree;
 mod view;
@@ -148,7 +150,7 @@ mod defaults {
 
     /// By name, since strategies do not know each other.
     pub(super) fn sampling() -> Box<dyn VisibilityMetric> {
-        serde_json::from_str(r#"{"type": "self-occlusion"}"#).expect("the program links farfield-strategies")
+        serde_json::from_str(r#"{"type": "void-surface"}"#).expect("the program links farfield-strategies")
     }
     pub(super) fn max_samples() -> u32 {
         20

@@ -4,12 +4,11 @@
 //! transforms, 32-bit offsets), so nothing depends on where in the scene it stands. A welded vertex has one shading normal and one
 //! albedo: at seams those of the chunk that names it first, which matters only where no picture shows the surface.
 
-use farfield_core::color::{byte_of_linear, linear_of_byte};
+use farfield_core::color::byte_of_linear;
 use farfield_core::id::{ChunkId, ObjectId};
-use farfield_core::mesh::ChunkMesh;
-use farfield_core::scene::{ChunkSet, Material, Scene, Texture};
+use farfield_core::scene::{ChunkSet, Scene, normal_matrix, vertex_albedo};
 use farfield_core::{Aabb, Fault};
-use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 /// Far chunks of one object that are simplified together.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,7 +75,8 @@ pub(crate) fn weld(scene: &Scene, piece: &Piece) -> Result<Welded, Fault> {
                     local[name as usize] = out.positions.len() as u32;
                     out.positions.push(to_piece.transform_point3(chunk.positions[i].as_dvec3()).as_vec3());
                     out.shading.push((turn * chunk.normals[i].as_dvec3()).normalize_or(DVec3::Y).as_vec3());
-                    out.albedo.push(albedo(chunk, i, &material, texture));
+                    let [r, g, b] = vertex_albedo(chunk, i, &material, texture).to_array().map(byte_of_linear);
+                    out.albedo.push([r, g, b, 255]);
                 }
             }
             for t in chunk.indices.chunks_exact(3) {
@@ -103,44 +103,4 @@ pub(crate) fn weld(scene: &Scene, piece: &Piece) -> Result<Welded, Fault> {
     }
     out.normals = sums.iter().zip(&out.shading).map(|(n, s)| n.try_normalize().map_or(*s, |n| n.as_vec3())).collect();
     Ok(out)
-}
-
-/// What turns normals: the cofactors, so that stretched objects keep normals at right angles; signed so that mirroring keeps
-/// them outside.
-fn normal_matrix(m: &DMat3) -> DMat3 {
-    let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
-    if m.determinant() < 0.0 { cofactors * -1.0 } else { cofactors }
-}
-
-/// Base colour x texture x vertex colour in linear light, as sRGB.
-fn albedo(chunk: &ChunkMesh, i: usize, material: &Material, texture: Option<&Texture>) -> [u8; 4] {
-    let mut c = Vec3::new(material.base_color[0], material.base_color[1], material.base_color[2]);
-    if let Some(v) = chunk.colors.get(i) {
-        c *= linear(*v);
-    }
-    if let (Some(t), Some(&uv)) = (texture, chunk.uvs.get(i)) {
-        c *= sample(t, uv);
-    }
-    let [r, g, b] = c.to_array().map(byte_of_linear);
-    [r, g, b, 255]
-}
-
-fn linear(c: [u8; 4]) -> Vec3 {
-    Vec3::new(linear_of_byte(c[0]), linear_of_byte(c[1]), linear_of_byte(c[2]))
-}
-
-/// Bilinear, repeated outside 0..1.
-fn sample(t: &Texture, uv: Vec2) -> Vec3 {
-    let [w, h] = t.size;
-    if w == 0 || h == 0 || !uv.is_finite() {
-        return Vec3::ONE;
-    }
-    let at = Vec2::new(uv.x.rem_euclid(1.0) * w as f32, uv.y.rem_euclid(1.0) * h as f32) - 0.5;
-    let (base, f) = (at.floor(), at - at.floor());
-    let texel = |dx: i32, dy: i32| {
-        let (x, y) = ((base.x as i32 + dx).rem_euclid(w as i32), (base.y as i32 + dy).rem_euclid(h as i32));
-        linear(t.rgba[(y as u32 * w + x as u32) as usize])
-    };
-    let top = texel(0, 0).lerp(texel(1, 0), f.x);
-    top.lerp(texel(0, 1).lerp(texel(1, 1), f.x), f.y)
 }

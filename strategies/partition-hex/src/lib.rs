@@ -21,7 +21,7 @@
 mod lattice;
 
 use farfield_core::camera::ViewModel;
-use farfield_core::cell::{Active, Cell, Outline, Sector, Split, Window, sees};
+use farfield_core::cell::{Active, Cell, Outline, Sector, Split, Window, leaves_at_once, sees};
 use farfield_core::context::Context;
 use farfield_core::id::{CellId, ChunkId, SectorId, SplitId};
 use farfield_core::region::Region;
@@ -155,21 +155,10 @@ impl Cells for Hexes {
     fn active(&self, cell: &Cell, camera: &Camera) -> Active {
         let meets = |s: &u32| {
             let window = &cell.sectors[*s as usize].window;
-            sees(camera, window) || self.leaves_at_once(camera, window)
+            sees(camera, window) || leaves_at_once(camera, window, IN_WINDOW * self.lattice.edge)
         };
         let sectors = (0..cell.sectors.len() as u32).filter(meets).map(SectorId).collect();
         Active { cell: cell.outline.id, split: SplitId(0), sectors }
-    }
-}
-
-impl Hexes {
-    /// Whether the eye stands in a window (or past it, by rounding) and some ray of the picture leads outwards.
-    fn leaves_at_once(&self, camera: &Camera, window: &Window) -> bool {
-        let axis = window.axis.as_dvec3();
-        let inside = axis.dot(window.corners[0].as_dvec3() - camera.eye);
-        let [w, h] = camera.size.map(|n| n as f32);
-        inside <= IN_WINDOW * self.lattice.edge
-            && [(0.0, 0.0), (w, 0.0), (0.0, h), (w, h)].iter().any(|&(x, y)| camera.ray(x, y).dot(window.axis) > 0.0)
     }
 }
 

@@ -8,7 +8,7 @@
 //! that reach there. O(chunks).
 
 use farfield_core::camera::ViewModel;
-use farfield_core::cell::{Active, Cell, Outline, Sector, Split, Window};
+use farfield_core::cell::{Active, Cell, Outline, Sector, Split, Window, leaves_at_once, sees};
 use farfield_core::context::Context;
 use farfield_core::id::{CellId, ChunkId, SectorId, SplitId};
 use farfield_core::region::Region;
@@ -18,6 +18,9 @@ use farfield_core::{Aabb, Camera, Fault};
 use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// An eye nearer to a window's plane than this share of the box's longest edge stands in the window.
+const IN_WINDOW: f32 = 1e-4;
 
 /// One cell.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
@@ -55,6 +58,11 @@ impl Partition for SingleCell {
         let outline = Outline { id: CellId(0), region, centre: window_box.centre(), neighbours: vec![] };
         Ok(Box::new(One { outline: [outline], window_box, px_per_tan: views.px_per_tan() }))
     }
+
+    /// 2: windows have the box's own corners.
+    fn version(&self) -> u32 {
+        2
+    }
 }
 
 impl Cells for One {
@@ -80,13 +88,11 @@ impl Cells for One {
                 .collect(),
         };
         let everywhere = outline.region == Region::Everywhere;
-        let sectors = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z]
-            .map(|axis| {
-                let corners = face(&self.window_box, axis);
-                let beyond =
-                    |c: &ChunkId| everywhere || reach(&scene.chunks[c.index()].bounds, axis) > corners[0].dot(axis);
+        let sectors = Window::faces(&self.window_box, self.px_per_tan)
+            .map(|window| {
+                let beyond = |c: &ChunkId| everywhere || window.is_before(&scene.chunks[c.index()].bounds);
                 let seen = far.iter().filter(beyond).collect();
-                Sector { split: SplitId(0), window: Window { axis, corners, px_per_tan: self.px_per_tan }, seen }
+                Sector { split: SplitId(0), window, seen }
             })
             .to_vec();
         Ok(Cell { outline, splits: vec![Split { far, near_budget: None }], sectors, own: vec![], claims: vec![] })
@@ -95,23 +101,14 @@ impl Cells for One {
     /// Without a region an eye may stand outside the windows' box, where none of them need be in its frustum: all are used.
     fn active(&self, cell: &Cell, camera: &Camera) -> Active {
         let all = cell.outline.region == Region::Everywhere;
-        let meets = |s: &u32| all || farfield_core::cell::sees(camera, &cell.sectors[*s as usize].window);
+        let slack = f64::from(IN_WINDOW * self.window_box.size().max_element());
+        let meets = |s: &u32| {
+            let window = &cell.sectors[*s as usize].window;
+            all || sees(camera, window) || leaves_at_once(camera, window, slack)
+        };
         let sectors = (0..cell.sectors.len() as u32).filter(meets).map(SectorId).collect();
         Active { cell: cell.outline.id, split: SplitId(0), sectors }
     }
-}
-
-/// The farthest that a box reaches along a coordinate axis.
-fn reach(b: &Aabb, axis: Vec3) -> f32 {
-    Vec3::select(axis.cmpge(Vec3::ZERO), b.max, b.min).dot(axis)
-}
-
-/// The corners of a box's face with this outward normal, counter-clockwise seen from outside.
-fn face(b: &Aabb, axis: Vec3) -> [Vec3; 4] {
-    let (half, centre) = (b.size() / 2.0, b.centre());
-    let up = if axis.y == 0.0 { Vec3::Y } else { Vec3::Z };
-    let side = up.cross(axis);
-    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(s, u)| centre + half * (axis + side * s + up * u))
 }
 
 #[cfg(test)]
@@ -191,7 +188,6 @@ mod tests {
         assert_eq!(cells.find(&views().camera(DVec3::new(0.0, 3.0, 0.0), 0.0, 0.0)), None);
         for c in far.iter() {
             for eye in inside.outline.region.corners().unwrap() {
-                let eye = eye.lerp(inside.outline.centre, 0.001);
                 let p = s.chunks[c.index()].bounds.centre();
                 let camera = Camera::looking(eye.as_dvec3(), p - eye, Vec3::Y, 0.02, [8, 8], 0.01);
                 let sectors = cells.active(&inside, &camera).sectors;

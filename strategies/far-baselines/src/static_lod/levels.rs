@@ -1,0 +1,114 @@
+//! The levels of one object: collapsed one after the other, each with how far it is off.
+//!
+//! The edge collapse of Garland and Heckbert (1997) on the welded vertices, survivors on original places; the quadrics go on from
+//! level to level, so a level is what one long collapse would leave. A corner whose vertex died takes the survivor's wedge that
+//! looks most like its own: corners stay on their side of a seam. O(n log n).
+
+use farfield_core::Fault;
+use farfield_core::collapse::{LiveMesh, Placement, QuadricSettings, Quadrics, Settings, collapse};
+use farfield_core::context::Context;
+use farfield_core::payload::MeshPart;
+use farfield_core::scene::Texture;
+use glam::Vec3;
+
+use super::StaticLod;
+use super::deviation::Original;
+use super::gather::{Source, Wedge};
+
+/// A level of detail.
+pub(super) struct Level {
+    /// A wedge a corner.
+    pub(super) corners: Vec<[u32; 3]>,
+    /// One-sided before two-sided; none is empty.
+    pub(super) parts: Vec<MeshPart>,
+    /// How far it is off, scene units; not less than the level's before.
+    pub(super) error: f32,
+}
+
+/// The levels below the original, finest first; none where the object has too few triangles.
+///
+/// # Errors
+/// [`Fault::Cancelled`], or [`Fault::Data`] where the mesh contradicts itself.
+pub(super) fn levels(
+    own: &StaticLod,
+    source: &Source,
+    textures: &[Texture],
+    cx: &Context<'_>,
+) -> Result<Vec<Level>, Fault> {
+    let target = |n: usize| (n as f64 * f64::from(own.ratio)).round() as usize;
+    let mut out: Vec<Level> = vec![];
+    let mut corners = source.corners.clone();
+    if target(corners.len()) < own.least_triangles as usize {
+        return Ok(out);
+    }
+    let original = Original::new(source, textures);
+    let wedges = wedges_of(source);
+    let (mut two_sided, mut quadrics) = (source.two_sided.clone(), None);
+    while target(corners.len()) >= own.least_triangles as usize {
+        cx.check()?;
+        let indices: Vec<u32> = corners.iter().flat_map(|&c| source.vertices(c)).collect();
+        let live = LiveMesh::new(&source.positions, &indices, &[])?;
+        let half_edge = QuadricSettings { placement: Placement::HalfEdge, ..QuadricSettings::default() };
+        let cost = quadrics.get_or_insert_with(|| Quadrics::new(&live, half_edge));
+        // Small closed parts may vanish, as they have to in scenes of many; a survivor on an original place opens no surface.
+        let settings = Settings { min_triangles: target(corners.len()), link_condition: false, ..Settings::default() };
+        let left = collapse(live, cost, &settings);
+        let kept: Vec<[u32; 3]> = left
+            .triangles
+            .iter()
+            .map(|&t| {
+                corners[t as usize].map(|w| {
+                    let wedge = &source.wedges[w as usize];
+                    let vertex = left.remap[wedge.vertex as usize];
+                    if vertex == wedge.vertex { w } else { alike(source, &wedges[vertex as usize], wedge) }
+                })
+            })
+            .collect();
+        // Where the collapse gets stuck, a level that saves less than half of what it should is not worth its bytes.
+        let least_saved = 0.5 * (1.0 - f64::from(own.ratio)) * corners.len() as f64;
+        if kept.is_empty() || ((corners.len() - kept.len()) as f64) < least_saved {
+            break;
+        }
+        two_sided = left.triangles.iter().map(|&t| two_sided[t as usize]).collect();
+        let error = original.deviation(&kept, own.max_albedo_off).max(out.last().map_or(0.0, |l| l.error));
+        out.push(Level { parts: parts(source, &kept, &two_sided), corners: kept.clone(), error });
+        corners = kept;
+    }
+    Ok(out)
+}
+
+/// For each vertex its wedges.
+fn wedges_of(source: &Source) -> Vec<Vec<u32>> {
+    let mut out = vec![vec![]; source.positions.len()];
+    (0u32..).zip(&source.wedges).for_each(|(i, w)| out[w.vertex as usize].push(i));
+    out
+}
+
+/// The wedge that looks most like another: least squared difference of normals and of albedo (over 255), the first of equals.
+fn alike(source: &Source, among: &[u32], to: &Wedge) -> u32 {
+    let colour = |c: [u8; 4]| Vec3::new(f32::from(c[0]), f32::from(c[1]), f32::from(c[2])) / 255.0;
+    let off = |w: &u32| {
+        let w = &source.wedges[*w as usize];
+        w.normal.distance_squared(to.normal) + colour(w.albedo).distance_squared(colour(to.albedo))
+    };
+    among.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or_default()
+}
+
+fn parts(source: &Source, corners: &[[u32; 3]], two_sided: &[bool]) -> Vec<MeshPart> {
+    let of = |two: bool| {
+        let mut part = MeshPart { two_sided: two, ..MeshPart::default() };
+        let mut local = vec![u32::MAX; source.wedges.len()];
+        for &w in corners.iter().zip(two_sided).filter(|(_, t)| **t == two).flat_map(|(c, _)| c) {
+            let (at, wedge) = (&mut local[w as usize], &source.wedges[w as usize]);
+            if *at == u32::MAX {
+                *at = part.positions.len() as u32;
+                part.positions.push(source.positions[wedge.vertex as usize]);
+                part.normals.push(wedge.normal);
+                part.albedo.push(wedge.albedo);
+            }
+            part.indices.push(*at);
+        }
+        part
+    };
+    [false, true].map(of).into_iter().filter(|p| !p.indices.is_empty()).collect()
+}
