@@ -149,6 +149,13 @@ pub fn registry() -> Vec<Entry> {
             source: textured!("3.1.2"),
             settings: settings_of::<metrics::SelfOcclusion>(),
         },
+        Entry {
+            kind: Kind::VisibilityMetric,
+            name: "void-surface",
+            summary: "The solid angle in which a viewpoint may see what no sample saw",
+            source: incremental!("3.3 and 3.5"),
+            settings: settings_of::<metrics::VoidSurface>(),
+        },
     ]
 }
 

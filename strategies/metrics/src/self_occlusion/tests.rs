@@ -210,8 +210,11 @@ fn the_claim_with_several_samples_holds_for_the_nearest_one() {
         }
         let camera =
             Camera::looking(eye.as_dvec3(), (b.centre() - eye).normalize(), Vec3::Y, views().fov_y_rad, [1024; 2], 0.1);
-        let at = |t: f32| camera.project(sample + through * t - eye).unwrap().truncate();
-        worst = worst.max(at(enter).distance(at(leave)));
+        let shown = |q: &Vec3| (0.0..1024.0).contains(&q.x) && (0.0..1024.0).contains(&q.y);
+        let at = |t: f32| camera.project(sample + through * t - eye).filter(shown);
+        if let (Some(p), Some(q)) = (at(enter), at(leave)) {
+            worst = worst.max(p.truncate().distance(q.truncate()));
+        }
     }
     println!("{worst} px of {} claimed", verdict.claim);
     assert!(f64::from(worst) <= verdict.claim && f64::from(worst) > 0.1 * verdict.claim);

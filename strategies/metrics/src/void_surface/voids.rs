@@ -53,11 +53,9 @@ impl Voids {
         let panoramas = Panorama::group(samples);
         let samples = collect(cx.run, panoramas.len(), &|i| {
             let own = &panoramas[i];
+            cx.check()?;
             let mut joined = Joined::new(own, tests);
-            for other in panoramas.iter().filter(|o| o.eye() != own.eye()) {
-                cx.check()?;
-                joined.see_past(own, other);
-            }
+            joined.see_past_all(own, panoramas.iter().filter(|o| o.eye() != own.eye()));
             Ok(Sample::new(own, &joined, &bounds))
         })?;
         Ok(Self { samples, bounds })
