@@ -183,3 +183,68 @@ fn one_picture_of_one_object_serves_a_far_cell_and_not_a_near_one() {
     assert!(near.value > 0.01 && !near.passes, "{near:?}");
     assert!(far.value < 1e-3 && far.passes, "{far:?}");
 }
+
+#[test]
+fn settings_that_are_no_numbers_and_regions_without_bound_are_refused() {
+    let world = World::new(&pierced(), 1.0);
+    let (views, cell) = (world.views(), world.cell(Vec3::ZERO, 1.0, true));
+    let refused = |metric: VoidSurface, cell: &farfield_core::cell::Cell| {
+        let subject = world.subject(cell, &views, &[]);
+        world.with(1, |cx| metric.judge(&subject, cx)).unwrap_err().to_string()
+    };
+    let plain = VoidSurface::default;
+    for (metric, word) in [
+        (VoidSurface { max_sr: f64::NAN, ..plain() }, "max_sr"),
+        (VoidSurface { max_sr: 13.0, ..plain() }, "max_sr"),
+        (VoidSurface { alpha_deg: -1.0, ..plain() }, "alpha_deg"),
+        (VoidSurface { face_px: 4, ..plain() }, "face_px"),
+        (VoidSurface { far: Some(0.0), ..plain() }, "far"),
+    ] {
+        assert!(refused(metric, &cell).contains(word));
+    }
+    let mut endless = cell.clone();
+    endless.outline.region = farfield_core::region::Region::Everywhere;
+    assert!(refused(plain(), &endless).contains("no bound"));
+}
+
+#[test]
+fn a_region_that_is_all_sampled_has_no_void_and_nothing_around_has_none_either() {
+    let world = World::new(&pierced(), 1.0);
+    let views = world.views();
+    // A region of one viewpoint.
+    let cell = world.cell(Vec3::new(0.0, 0.0, 1.0), 0.0, true);
+    let pictures = world.samples(&[Vec3::new(0.0, 0.0, 1.0)], 16);
+    let metric = VoidSurface::default();
+    let ask = |subject: &farfield_core::strategy::Subject<'_>| {
+        world.with(1, |cx| (metric.judge(subject, cx).unwrap(), metric.next(subject, cx).unwrap()))
+    };
+    let (verdict, next) = ask(&world.subject(&cell, &views, &pictures));
+    assert!(verdict.value == 0.0 && verdict.passes && next.is_none());
+    // Samples that see nothing know of no void.
+    let cell = world.cell(Vec3::new(0.0, 0.0, 1.0), 1.0, true);
+    let empty = |c: &farfield_core::Camera| {
+        let n = (c.size[0] * c.size[1]) as usize;
+        let depth = vec![f32::INFINITY; n];
+        (*c, farfield_core::image::SurfaceImage { size: c.size, depth, object: vec![0; n], ..Default::default() })
+    };
+    let cube = farfield_core::Camera::cube(world.local(Vec3::new(0.0, 0.0, 1.0)), 16, world.near());
+    let blank: Vec<_> = cube.iter().map(empty).collect();
+    let (verdict, next) = ask(&world.subject(&cell, &views, &blank));
+    assert!(verdict.value == 0.0 && next.is_none());
+}
+
+#[test]
+fn a_far_threshold_makes_skins_of_what_lies_beyond_it() {
+    let world = World::new(&furnished(), 1.0);
+    let views = world.views();
+    let cell = world.cell(Vec3::ZERO, 3.0, true);
+    let pictures = world.samples(&[Vec3::ZERO, Vec3::new(2.0, 0.0, 2.0)], 32);
+    let value = |far: Option<f32>, max_sr: f64| {
+        let metric = VoidSurface { far, max_sr, face_px: 32, ..VoidSurface::default() };
+        world.with(1, |cx| metric.judge(&world.subject(&cell, &views, &pictures), cx)).unwrap()
+    };
+    let (all, near) = (value(None, 0.2), value(Some(6.0), 0.2));
+    assert!(near.value > all.value, "{near:?} {all:?}");
+    assert_eq!(value(Some(1e6), 0.2), all);
+    assert!(value(None, all.value).passes && !value(None, all.value * 0.99).passes);
+}

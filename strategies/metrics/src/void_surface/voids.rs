@@ -176,3 +176,21 @@ fn key(p: &Panorama<'_>, view: usize, x: u32, y: u32) -> u32 {
         p.views()[..view].iter().map(|(c, _)| c.size[0].div_ceil(PATCH) * c.size[1].div_ceil(PATCH)).sum();
     before + y / PATCH * columns + x / PATCH
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mask_of_all_pixels_is_all_around_whatever_their_number() {
+        for px in [8, 33, 128, 512] {
+            let face = Camera::cube(DVec3::ZERO, px, 0.1)[0];
+            let n = (6 * px * px) as usize;
+            let all = solid_angle(&face, &vec![true; n]);
+            assert!((all / (4.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6, "{all}");
+            let half = solid_angle(&face, &[vec![true; n / 2], vec![false; n / 2]].concat());
+            assert!((half / all - 0.5).abs() < 1e-12);
+            assert_eq!(solid_angle(&face, &vec![false; n]), 0.0);
+        }
+    }
+}
