@@ -44,8 +44,9 @@ impl Joined {
     pub fn new(p: &Panorama<'_>, tests: &SkinTests) -> Self {
         let cos = tests.alpha_rad.cos();
         let points = points(p);
+        let depths: Vec<f32> = p.views().iter().flat_map(|(_, image)| image.depth.iter().copied()).collect();
         let joins = |a: u32, b: u32| {
-            let near = |i: u32| p.depth(i) <= tests.far;
+            let near = |i: u32| depths[i as usize] <= tests.far;
             let (pa, pb) = (points[a as usize], points[b as usize]);
             // Written so that what is not finite does not join.
             let (edge, ray) = (pb - pa, pa + pb);
@@ -118,13 +119,10 @@ impl Joined {
                 return;
             }
             let at = |i: u32| reciprocal[i as usize];
-            let bends = |before: u32, a: u32, b: u32| {
-                let off = (at(before) - 2.0 * at(a) + at(b)).abs();
-                // Written so that what is not finite bends.
-                !(off <= flat * at(a))
-            };
-            let along = edge.along(p);
-            if along.is_none_or(|[before, behind]| bends(before, edge.a, edge.b) || bends(behind, edge.b, edge.a)) {
+            // Written so that what is not finite is not level.
+            let level = |before: u32, a: u32, b: u32| (at(before) - 2.0 * at(a) + at(b)).abs() <= flat * at(a);
+            let plane = |[before, behind]: [u32; 2]| level(before, edge.a, edge.b) && level(behind, edge.b, edge.a);
+            if !edge.along(p).is_some_and(plane) {
                 out.push((edge, 0.5 * (points[edge.a as usize] + points[edge.b as usize])));
             }
         });

@@ -75,6 +75,22 @@ fn with_several_samples_rays_find_what_none_of_them_saw() {
 }
 
 #[test]
+fn among_hanging_blocks_it_is_the_rays_that_pass_through_unknown_space() {
+    // Behind it may stand something that was seen: F is then more than what is missing.
+    let world = World::new(&hanging(60), 1.0);
+    let eyes = [[-3.0, -3.0], [3.0, -3.0], [0.3, 3.0]].map(|p| Vec3::new(p[0], 0.1, p[1]));
+    let (from, px) = (Vec3::new(0.7, 0.4, -0.3), 48);
+    for n in [1, 2, 3] {
+        let found = world.voids(&world.samples(&eyes[..n], 8 * px)).unseen(world.local(from), px, world.near());
+        let c = compare(&found, &world.truly_void(from, &eyes[..n], px), px);
+        let missing = compare(&found, &world.truly_unseen(from, &eyes[..n], px), px).true_sr;
+        println!("{n} samples: {c:?}, {missing} sr missing");
+        assert!(missing < c.true_sr);
+        agrees(c);
+    }
+}
+
+#[test]
 fn a_sample_misses_nothing_where_it_was_taken_and_more_samples_miss_less() {
     let world = World::new(&furnished(), 1.0);
     let eyes = [[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [-3.0, 3.0], [0.0, 0.0]].map(|p| Vec3::new(p[0], 0.0, p[1]));

@@ -3,7 +3,7 @@
 use farfield_core::context::{Context, collect};
 use farfield_core::image::SurfaceImage;
 use farfield_core::panorama::raster::Raster;
-use farfield_core::panorama::{Joined, NONE, Panorama, SkinTests, Surface, pixel_solid_angle_sr};
+use farfield_core::panorama::{Joined, NONE, Panorama, Place, SkinTests, Surface, pixel_solid_angle_sr};
 use farfield_core::{Aabb, Camera, Fault};
 use glam::DVec3;
 
@@ -160,13 +160,29 @@ impl Sample {
         });
         let wall_count = keyed.len();
         let walls = Patches::new(points, keyed);
-        let pixel = |i: u32| {
-            let at = p.place(i);
-            Some((key(p, at.view, at.x, at.y), surface.quads[i as usize])).filter(|(_, q)| q[0] != NONE)
-        };
-        let keyed = (0..p.pixels()).filter_map(pixel).collect();
+        let mut keyed = Vec::with_capacity(surface.quads.len());
+        for at in by_patch(p) {
+            let quad = surface.quads[p.pixel(at) as usize];
+            if quad[0] != NONE {
+                keyed.push((key(p, at.view, at.x, at.y), quad));
+            }
+        }
         Self { eye: p.eye(), surface: Patches::new(surface.points, keyed), walls, wall_count }
     }
+}
+
+/// All pixels, square by square.
+fn by_patch<'a>(p: &'a Panorama<'_>) -> impl Iterator<Item = Place> + 'a {
+    let squares = |n: u32| (0..n.div_ceil(PATCH)).map(move |i| i * PATCH..((i + 1) * PATCH).min(n));
+    (0..p.views().len()).flat_map(move |view| {
+        let [w, h] = p.views()[view].0.size;
+        squares(h).flat_map(move |rows| {
+            squares(w).flat_map(move |columns| {
+                let row = move |y| columns.clone().map(move |x| Place { view, x, y });
+                rows.clone().flat_map(row)
+            })
+        })
+    })
 }
 
 /// The number of a pixel's square.
