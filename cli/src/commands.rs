@@ -102,9 +102,10 @@ fn generate(kind: Generated, triangles: Option<u64>, seed: u64, out: &Path) -> R
     let parts = scene::generate(kind, triangles, seed)?;
     let (written, objects) = (parts.triangles(), parts.placements.len());
     let what = match kind {
+        Generated::House => "objects",
         Generated::Park => "statues",
-        Generated::Pipes => "parts",
+        Generated::Pipes | Generated::Plant => "parts",
     };
-    scene::write(out, kind, parts)?;
+    scene::write(out, parts)?;
     print(&format!("{}: {written} triangles, {objects} {what}\n", out.display()))
 }

@@ -4,10 +4,15 @@
 //! in the scene's footprint, at eye height, walked at constant speed: at most `max_speed`, and slower where the tangent turns
 //! faster than `max_turn_rad` a second, so that both limits hold at every pair of frames. Legs never enter an obstacle's box
 //! inflated by the clearance: a leg that would is led around it, and what is left is checked, not assumed. **orbit** circles the
-//! bounds, **line** crosses them, **still** stands; **keyed** paths follow given key frames.
+//! bounds, **line** crosses them, **still** stands; **keyed** paths follow given key frames; a **route** is a closed way that a scene
+//! brings along.
 //!
 //! Limits: a tour repeats nothing within `frames`; how much of the scene it sees is its length, at most
 //! frames * max_speed / frames_per_s. O(waypoints * obstacles + frames).
+
+mod route;
+
+pub use route::route;
 
 use glam::{DVec2, DVec3, Vec3};
 

@@ -4,14 +4,28 @@ use farfield_core::camera::ViewModel;
 use farfield_core::path::{self, Key, PathJob};
 use farfield_core::scene::Scene;
 use farfield_core::{Aabb, Camera};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
 use crate::config::ViewSettings;
 use crate::failure::Failure;
 
 /// The paths that have names.
-pub const PATHS: [&str; 4] = ["line", "orbit", "still", "tour"];
+pub const PATHS: [&str; 5] = ["line", "orbit", "route", "still", "tour"];
+
+/// The path along the route that a generated scene brings along.
+pub const ROUTE: &str = "route";
+/// How far before a corner a route starts to round it, scene units at a scale of 1: half a step. Generators keep the corners' triangles free.
+pub const ROUNDING: f64 = 0.4;
+
+/// A closed way that is free of a scene's geometry, local frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Route {
+    /// Corners, (x, z).
+    pub points: Vec<DVec2>,
+    /// How far before a corner it may be rounded, scene units.
+    pub rounding: f64,
+}
 
 /// The view model: what is not given follows from the scene's size.
 pub fn views(v: &ViewSettings, scene: &Scene) -> ViewModel {
@@ -29,11 +43,16 @@ pub fn views(v: &ViewSettings, scene: &Scene) -> ViewModel {
     }
 }
 
-/// The cameras of the path, local frame.
+/// The cameras of the path, local frame; `along` is what [`crate::scene::Loaded`] has of a route.
 ///
 /// # Errors
-/// [`Failure::Input`] where the scene leaves no way or a file of key frames is not what it should be.
-pub fn cameras(v: &ViewSettings, views: &ViewModel, scene: &Scene) -> Result<Vec<Camera>, Failure> {
+/// [`Failure::Input`] where the scene leaves no way or has no route, or a file of key frames is not what it should be.
+pub fn cameras(
+    v: &ViewSettings,
+    views: &ViewModel,
+    scene: &Scene,
+    along: Option<&Route>,
+) -> Result<Vec<Camera>, Failure> {
     let obstacles: Vec<Aabb> = scene.objects.iter().map(|o| o.bounds).collect();
     let job = PathJob {
         bounds: scene.bounds,
@@ -47,6 +66,11 @@ pub fn cameras(v: &ViewSettings, views: &ViewModel, scene: &Scene) -> Result<Vec
     match v.path.as_str() {
         "line" => Ok(path::line(&job)),
         "orbit" => Ok(path::orbit(&job)),
+        ROUTE => {
+            let none = || Failure::input("the path \"route\"", "the scene brings no route along; a house and a plant do");
+            let route = along.ok_or_else(none)?;
+            path::route(&job, &route.points, route.rounding).map_err(failed)
+        }
         "still" => Ok(path::still(&job)),
         "tour" => path::tour(&job).map_err(failed),
         file => path::keyed(&job, &keys(file, scene.origin)?).map_err(failed),

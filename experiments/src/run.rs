@@ -71,7 +71,7 @@ pub fn prepare(experiment: &Experiment, options: &Options<'_>) -> Result<Prepare
     loaded.warnings.iter().for_each(|w| (options.say)(&format!("warning: {w}")));
     let scene = Arc::new(loaded.scene);
     let views = path::views(&experiment.view, &scene);
-    let cameras = path::cameras(&experiment.view, &views, &scene)?;
+    let cameras = path::cameras(&experiment.view, &views, &scene, loaded.route.as_ref())?;
     let mut divisions: Vec<Division> = vec![];
     for (i, p) in experiment.pipelines.iter().enumerate() {
         // Pipelines with the same partition share its cells.

@@ -6,13 +6,17 @@ use farfield_core::draw::Shading;
 use farfield_core::id::MaterialId;
 use farfield_core::mesh::TriangleMesh;
 use farfield_core::scene::{Light, LightKind, Material, Placement, Scene, SceneBuilder, Texture};
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3};
 
 use crate::config::{Experiment, Generated, LightSettings, SceneSettings, Up};
 use crate::export::{Export, ExportError, export};
 use crate::failure::Failure;
-use crate::generate::{self, PAPER_MODELS, ParkScene, ParkSettings, PipesScene, PipesSettings, park, park_of, pipes};
+use crate::generate::{
+    self, HouseScene, HouseSettings, PAPER_MODELS, ParkScene, ParkSettings, PipesScene, PipesSettings, PlantScene,
+    PlantSettings, house, park, park_of, pipes, plant,
+};
 use crate::load::{self, LoadOptions};
+use crate::path::{ROUNDING, Route};
 
 /// A loaded or generated scene.
 pub struct Loaded {
@@ -22,6 +26,8 @@ pub struct Loaded {
     pub source: String,
     /// What importers left out or guessed.
     pub warnings: Vec<String>,
+    /// The way that it brings along, where it does.
+    pub route: Option<Route>,
 }
 
 /// Loads or generates an experiment's scene.
@@ -50,35 +56,38 @@ fn file(s: &SceneSettings, path: &str) -> Result<Loaded, Failure> {
     if scene.triangles() == 0 {
         return Err(refused(&format!("{path}: there is no triangle in it")));
     }
-    Ok(Loaded { scene, source: path.to_owned(), warnings: imported.warnings })
+    Ok(Loaded { scene, source: path.to_owned(), warnings: imported.warnings, route: None })
 }
 
 fn generated(s: &SceneSettings, to_world: DAffine3) -> Result<Loaded, Failure> {
     let refused = |e: &dyn ToString| Failure::input("the scene was not generated", e.to_string());
     let two_sided = s.two_sided.unwrap_or(false);
     let kind = s.source.unwrap_or(Generated::Park);
-    let (parts, materials, textures, source) = match &s.models {
-        None => (generate(kind, s.triangles, s.seed)?, vec![painted(kind, two_sided)], vec![], kind.name().to_owned()),
+    let (mut parts, source) = match &s.models {
+        None => (generate(kind, s.triangles, s.seed)?, kind.name().to_owned()),
         Some(folder) => {
             let settings = ParkSettings { triangles: s.triangles.unwrap_or(kind.triangles()), seed: s.seed };
-            let (park, materials, textures) = of_models(&settings, Path::new(folder), two_sided)?;
-            (park.into(), materials, textures, format!("park of {folder}"))
+            (of_models(&settings, Path::new(folder))?, format!("park of {folder}"))
         }
     };
-    let scene = placed(parts, materials, textures, to_world).map_err(|e| refused(&e))?;
-    Ok(Loaded { scene, source, warnings: vec![] })
+    parts.materials.iter_mut().for_each(|m| m.two_sided = two_sided);
+    let corners = std::mem::take(&mut parts.route);
+    let scene = placed(parts, to_world).map_err(|e| refused(&e))?;
+    let local = |p: &DVec2| {
+        let q = to_world.transform_point3(DVec3::new(p.x, 0.0, p.y)) - scene.origin;
+        DVec2::new(q.x, q.z)
+    };
+    let route = (!corners.is_empty())
+        .then(|| Route { points: corners.iter().map(local).collect(), rounding: ROUNDING * s.scale });
+    Ok(Loaded { scene, source, warnings: vec![], route })
 }
 
 /// The park of the paper's models, read from a folder.
-fn of_models(
-    settings: &ParkSettings,
-    folder: &Path,
-    two_sided: bool,
-) -> Result<(ParkScene, Vec<Material>, Vec<Texture>), Failure> {
+fn of_models(settings: &ParkSettings, folder: &Path) -> Result<Parts, Failure> {
     let refused = |e: &dyn ToString| Failure::input("the park's models were not loaded", e.to_string());
     let (mut materials, mut textures, mut meshes) = (vec![], vec![], vec![]);
     for model in &PAPER_MODELS {
-        let options = LoadOptions { two_sided: Some(two_sided), ..LoadOptions::default() };
+        let options = LoadOptions { two_sided: Some(false), ..LoadOptions::default() };
         let (mut mesh, own, images) = load::load_mesh(&folder.join(model.file), &options).map_err(|e| refused(&e))?;
         let (first_material, first_texture) = (materials.len() as u32, textures.len() as u32);
         mesh.sections.iter_mut().for_each(|s| s.1 = MaterialId(s.1.0 + first_material));
@@ -91,17 +100,12 @@ fn of_models(
     }
     let meshes: [TriangleMesh; 8] = meshes.try_into().map_err(|_| refused(&"there are eight kinds of statues"))?;
     let park = park_of(settings, &PAPER_MODELS, meshes).map_err(|e| refused(&e))?;
-    Ok((park, materials, textures))
+    Ok(Parts { materials, textures, ..Parts::from(park) })
 }
 
-fn placed(
-    parts: Parts,
-    materials: Vec<Material>,
-    textures: Vec<Texture>,
-    to_world: DAffine3,
-) -> Result<Scene, farfield_core::Fault> {
+fn placed(parts: Parts, to_world: DAffine3) -> Result<Scene, farfield_core::Fault> {
     let mut builder = SceneBuilder::default();
-    (builder.materials, builder.textures) = (materials, textures);
+    (builder.materials, builder.textures) = (parts.materials, parts.textures);
     let mut ids = vec![];
     for (name, mesh) in parts.meshes {
         ids.push(builder.mesh(&name, sectioned(mesh))?);
@@ -118,6 +122,12 @@ pub struct Parts {
     pub meshes: Vec<(String, TriangleMesh)>,
     /// Which mesh, and from its space to the scene.
     pub placements: Vec<(usize, DAffine3)>,
+    /// Materials that the meshes' sections name; a mesh without sections is of the first.
+    pub materials: Vec<Material>,
+    /// Textures that materials name.
+    pub textures: Vec<Texture>,
+    /// Corners (x, z) of a closed way that is free at the default eye height; empty where there is none.
+    pub route: Vec<DVec2>,
 }
 
 impl Parts {
@@ -132,13 +142,31 @@ impl From<ParkScene> for Parts {
         Self {
             placements: park.placements.iter().map(|p| (p.kind as usize, transform(p))).collect(),
             meshes: park.meshes.into_iter().map(|(n, m)| (n.to_owned(), m)).collect(),
+            materials: vec![painted("statue")],
+            textures: vec![],
+            route: vec![],
         }
     }
 }
 
 impl From<PipesScene> for Parts {
     fn from(pipes: PipesScene) -> Self {
-        Self { meshes: pipes.meshes, placements: pipes.placements }
+        let materials = vec![painted("paint")];
+        Self { meshes: pipes.meshes, placements: pipes.placements, materials, textures: vec![], route: vec![] }
+    }
+}
+
+impl From<HouseScene> for Parts {
+    fn from(house: HouseScene) -> Self {
+        let HouseScene { meshes, placements, materials, textures, route } = house;
+        Self { meshes, placements, materials, textures, route }
+    }
+}
+
+impl From<PlantScene> for Parts {
+    fn from(plant: PlantScene) -> Self {
+        let PlantScene { meshes, placements, route } = plant;
+        Self { meshes, placements, materials: vec![painted("paint")], textures: vec![], route }
     }
 }
 
@@ -149,8 +177,10 @@ impl From<PipesScene> for Parts {
 pub fn generate(kind: Generated, triangles: Option<u64>, seed: u64) -> Result<Parts, Failure> {
     let triangles = triangles.unwrap_or(kind.triangles());
     let made = match kind {
+        Generated::House => house(&HouseSettings { triangles, seed }).map(Parts::from),
         Generated::Park => park(&ParkSettings { triangles, seed }).map(Parts::from),
         Generated::Pipes => pipes(&PipesSettings { triangles, seed }).map(Parts::from),
+        Generated::Plant => plant(&PlantSettings { triangles, seed }).map(Parts::from),
     };
     made.map_err(|e| Failure::input("the scene was not generated", e))
 }
@@ -159,26 +189,22 @@ pub fn generate(kind: Generated, triangles: Option<u64>, seed: u64) -> Result<Pa
 ///
 /// # Errors
 /// What writing gives; a wrong format is [`Failure::Input`].
-pub fn write(file: &Path, kind: Generated, parts: Parts) -> Result<(), Failure> {
-    let meshes: Vec<(String, TriangleMesh)> = parts.meshes.into_iter().map(|(n, m)| (n, sectioned(m))).collect();
-    let materials = [painted(kind, false)];
-    let scene = Export { meshes: &meshes, placements: &parts.placements, materials: &materials, textures: &[] };
+pub fn write(file: &Path, parts: Parts) -> Result<(), Failure> {
+    let Parts { meshes, placements, materials, textures, .. } = parts;
+    let meshes: Vec<(String, TriangleMesh)> = meshes.into_iter().map(|(n, m)| (n, sectioned(m))).collect();
+    let scene = Export { meshes: &meshes, placements: &placements, materials: &materials, textures: &textures };
     export(file, &scene).map_err(|e| match e {
         ExportError::Unsupported { .. } => Failure::input("the scene was not written", e),
         ExportError::Write { .. } => Failure::work("the scene was not written", e),
     })
 }
 
-/// Generated meshes carry their colours in their vertices.
-fn painted(kind: Generated, two_sided: bool) -> Material {
-    let name = match kind {
-        Generated::Park => "statue",
-        Generated::Pipes => "paint",
-    };
-    Material { name: name.into(), base_color: [1.0; 4], texture: None, two_sided }
+/// For meshes that carry their colours in their vertices.
+fn painted(name: &str) -> Material {
+    Material { name: name.into(), base_color: [1.0; 4], texture: None, two_sided: false }
 }
 
-/// A generated mesh names no material: all of it is the first.
+/// Where a generated mesh names no material, all of it is the first.
 fn sectioned(mut mesh: TriangleMesh) -> TriangleMesh {
     if mesh.sections.is_empty() {
         mesh.sections = vec![(0..mesh.indices.len() as u32, MaterialId(0))];

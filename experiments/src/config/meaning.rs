@@ -8,11 +8,11 @@ use serde_json::{Map, Value};
 use super::mistakes::Collector;
 use super::node::{At, Node, What};
 use super::settings::{BuildWhen, Generated};
-use crate::generate::gallery_height;
-use crate::path::PATHS;
+use crate::generate::{HOUSE_EYE, PLANT_EYE, gallery_height};
+use crate::path::{PATHS, ROUTE};
 
 /// How a scene is named.
-pub(super) const SCENE_HELP: &str = "source = \"park\" or \"pipes\" generates a scene, path = \"model.glb\" loads one";
+pub(super) const SCENE_HELP: &str = "source = \"house\", \"park\", \"pipes\" or \"plant\" generates a scene, path = \"model.glb\" loads one";
 
 /// Checks, and makes paths absolute and the reference explicit.
 pub(super) fn check(
@@ -58,7 +58,7 @@ fn scene(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes
     if let Some(kind) = generated(scene) {
         scene.entry("triangles").or_insert(kind.triangles().into());
         if kind != Generated::Park && scene.contains_key("models") {
-            let message = format!("`models` makes a park; {} are not made of them", kind.name());
+            let message = format!("`models` makes a park; source \"{}\" is not made of them", kind.name());
             mistakes.add(&at(root, "scene", "models"), message, "not here", None);
         }
     }
@@ -81,14 +81,23 @@ fn generated(scene: &Map<String, Value>) -> Option<Generated> {
     Generated::ALL.into_iter().find(|g| g.name() == name)
 }
 
+/// The height above a generated scene's lowest point at which there is always a way, scene units; `None` where there is none of its
+/// own.
+fn standing(scene: &Map<String, Value>) -> Option<f64> {
+    let scale = scene.get("scale").and_then(Value::as_f64)?;
+    let height = match generated(scene)? {
+        Generated::House => HOUSE_EYE,
+        Generated::Park => return None,
+        Generated::Pipes => gallery_height(scene.get("triangles").and_then(Value::as_u64)?),
+        Generated::Plant => PLANT_EYE,
+    };
+    Some(scale * height)
+}
+
 fn view(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes: &mut Collector<'_>) {
-    // The one height at which there is always a way through pipes depends on their total.
-    let gallery = resolved["scene"].as_object().filter(|s| generated(s) == Some(Generated::Pipes)).and_then(|s| {
-        let scale = s.get("scale").and_then(Value::as_f64)?;
-        Some(scale * gallery_height(s.get("triangles").and_then(Value::as_u64)?))
-    });
+    let source = resolved["scene"].as_object().map(|s| (generated(s), standing(s)));
     let Some(view) = resolved["view"].as_object_mut() else { return };
-    if let Some(height) = gallery {
+    if let Some(height) = source.and_then(|s| s.1) {
         view.entry("eye_height").or_insert(serde_json::json!([height, height]));
     }
     let numbers = |v: &Map<String, Value>, key: &str| -> Vec<f64> {
@@ -116,6 +125,9 @@ fn view(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes:
         } else if !PATHS.contains(&path.as_str()) {
             let help = format!("paths: {}, or a .csv of key frames", PATHS.join(", "));
             mistakes.add(&at(root, "view", "path"), format!("no path is called \"{path}\""), "unknown", Some(help));
+        } else if path == ROUTE && source.is_some_and(|s| !s.0.is_some_and(Generated::has_route)) {
+            let help = "a house and a plant bring a route along; elsewhere a .csv of key frames says where to go".to_owned();
+            mistakes.add(&at(root, "view", "path"), "the scene brings no route along", "no route", Some(help));
         }
     }
 }

@@ -9,36 +9,49 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::generate::{PARK_2M, PIPES_1M};
+use crate::generate::{HOUSE_PAPER, PARK_2M, PIPES_1M, PLANT_1M};
 
 /// Where a scene comes from, where it is not a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Generated {
+    /// The furnished house.
+    House,
     /// The statuary park.
     Park,
     /// The array of pipes.
     Pipes,
+    /// The power plant.
+    Plant,
 }
 
 impl Generated {
     /// Every one, in alphabetical order.
-    pub const ALL: [Self; 2] = [Self::Park, Self::Pipes];
+    pub const ALL: [Self; 4] = [Self::House, Self::Park, Self::Pipes, Self::Plant];
 
     /// As experiment files and the command line spell it.
     pub fn name(self) -> &'static str {
         match self {
+            Self::House => "house",
             Self::Park => "park",
             Self::Pipes => "pipes",
+            Self::Plant => "plant",
         }
     }
 
-    /// Triangles where nothing is said: the paper's 2M park, the paper's pipes.
+    /// Triangles where nothing is said: the papers' house, 2M park and pipes, a million of a plant.
     pub fn triangles(self) -> u64 {
         match self {
+            Self::House => HOUSE_PAPER,
             Self::Park => PARK_2M,
             Self::Pipes => PIPES_1M,
+            Self::Plant => PLANT_1M,
         }
+    }
+
+    /// Whether it brings a route along, for `path = "route"`.
+    pub fn has_route(self) -> bool {
+        matches!(self, Self::House | Self::Plant)
     }
 }
 
@@ -62,7 +75,8 @@ pub struct SceneSettings {
     /// A model file (.obj, .ply, .gltf, .glb, .stl, each also as .gz) or a folder of them in one coordinate frame, relative to the
     /// experiment file.
     pub path: Option<String>,
-    /// Triangles of a generated scene, all objects together; without it 2,017,700 of a park, 1,000,000 of pipes.
+    /// Triangles of a generated scene, all objects together; without it 262,879 of a house, 2,017,700 of a park, 1,000,000 of pipes
+    /// and of a plant.
     #[schemars(range(min = 1))]
     pub triangles: Option<u64>,
     /// Seed of a generated scene.
@@ -110,8 +124,8 @@ pub struct ViewSettings {
     /// Nothing nearer to the eye's plane is drawn; without it a 200th of `eye_height`, or a 10,000th of the scene.
     #[schemars(extend("unit" = "scene units", "exclusiveMinimum" = 0.0))]
     pub near: Option<f32>,
-    /// Lowest and highest eye above the scene's lowest point; without it a hundredth of its longest horizontal side, in pipes
-    /// half their height, where there is a way.
+    /// Lowest and highest eye above the scene's lowest point; without it a hundredth of its longest horizontal side; in pipes
+    /// half their height, in a house and a plant that of a standing person, where there is a way.
     #[schemars(extend("unit" = "scene units"))]
     pub eye_height: Option<[f32; 2]>,
     /// Lowest and highest pitch; 0 is level, positive looks up.
@@ -126,7 +140,7 @@ pub struct ViewSettings {
     /// Frames in a second of the path.
     #[schemars(extend("unit" = "1/s", "exclusiveMinimum" = 0.0))]
     pub frames_per_s: f32,
-    /// `tour`, `orbit`, `line`, `still`, or a .csv of key frames (time_s,x,y,z,yaw_deg,pitch_deg), relative to the experiment file.
+    /// `tour`, `route` (a house's or a plant's own), `orbit`, `line`, `still`, or a .csv of key frames (time_s,x,y,z,yaw_deg,pitch_deg), relative to the experiment file.
     pub path: String,
     /// Seed of the path.
     pub seed: u64,

@@ -160,7 +160,7 @@ fn pipes_bring_their_own_size_and_eye_height() {
     let park = read(&GOOD.replace("triangles = 200_000", ""), &[]).unwrap();
     assert_eq!((park.scene.triangles, park.view.eye_height), (Some(2_017_700), None));
     let all = told(&text.replace("\"pipes\"", "\"pipes\"\nmodels = \"/\""), &[]);
-    assert_eq!(all, ["park.toml:4:10: `models` makes a park; pipes are not made of them"]);
+    assert_eq!(all, ["park.toml:4:10: `models` makes a park; source \"pipes\" is not made of them"]);
 }
 
 #[test]

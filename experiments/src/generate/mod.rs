@@ -3,29 +3,38 @@
 //! [`park`] is a statuary park after the one that system T was measured on: eight kinds of procedurally sculpted statues with
 //! that scene's triangle counts, sizes, numbers and area, at any total from 100,000 to 64 million triangles; or the same
 //! park from mesh files, fitted to the same boxes ([`fit`]). [`pipes`] is a box full of pipework, from 10,000 to 16 million.
+//! [`house`] is a furnished and textured house in its garden, from 20,000 to 4 million; [`plant`] a power plant, from 100,000 to 12.5 million; both
+//! bring a route along.
 //! Everything here is a pure function of its settings: the same settings give the same bytes, whatever the number of threads.
 
 mod creatures;
+mod detail;
 mod figures;
 pub mod fit;
+mod forms;
+pub mod house;
 mod kind;
 mod march;
 mod noise;
 pub mod park;
 pub mod pipes;
+pub mod plant;
 mod quadrupeds;
 mod remesh;
 mod sculpt;
 mod sdf;
 mod shade;
 mod shapes;
+mod solid;
 #[cfg(test)]
 mod tests;
 
 pub use fit::{Up, fit_to_box};
+pub use house::{HOUSE_EYE, HOUSE_PAPER, HouseScene, HouseSettings, LEAST_HOUSE, MOST_HOUSE, house};
 pub use kind::{Kind, PAPER_MODELS, PaperModel};
 pub use park::{Layout, PARK_2M, PARK_4M, PARK_8M, ParkScene, ParkSettings, Placement, layout, park, park_of};
 pub use pipes::{LEAST_PIPES, MOST_PIPES, PIPES_1M, PipesScene, PipesSettings, gallery_height, pipes};
+pub use plant::{LEAST_PLANT, MOST_PLANT, PLANT_1M, PLANT_EYE, PlantScene, PlantSettings, plant};
 pub use sculpt::{LEAST_TRIANGLES, MOST_TRIANGLES, sculpt};
 
 /// Why a scene could not be generated.

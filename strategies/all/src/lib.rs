@@ -152,8 +152,8 @@ pub fn registry() -> Vec<Entry> {
         Entry {
             kind: Kind::VisibilityMetric,
             name: "void-surface",
-            summary: "The solid angle in which a viewpoint may see what no sample saw",
-            source: incremental!("3.3 and 3.5"),
+            summary: "The solid angle in which viewpoints may see what no sample saw",
+            source: incremental!("3.3 to 3.5"),
             settings: settings_of::<metrics::VoidSurface>(),
         },
     ]

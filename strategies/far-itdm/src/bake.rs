@@ -15,7 +15,7 @@ use glam::{DVec3, Vec3};
 
 use crate::dense::Dense;
 use crate::index::{Cube, Index, Piece};
-use crate::redundancy::kept;
+use crate::redundancy::{Sample, kept, mend};
 use crate::samples::{joined, panoramas, take};
 use crate::simplify::{Extremes, Limits, Simplified, simplify};
 use crate::texels::{Patch, patches, write};
@@ -63,7 +63,7 @@ pub(crate) fn bake(
         None => Tree { parent: vec![None; eyes.len()], order: (0..eyes.len()).collect() },
     };
     let surfaces = collect(cx.run, all.len(), &|i| Ok(Surface::new(&all[i], &joined[i])))?;
-    let kept = redundant(making, &all, &tree, cx)?;
+    let kept = redundant(making, &all, &surfaces, &tree, cx)?;
     let first = index.cubes.len() as u32;
     let place = |i: usize| first + tree.order.iter().position(|&o| o == i).unwrap_or_default() as u32;
     let made = collect(cx.run, tree.order.len(), &|k| {
@@ -96,15 +96,34 @@ pub(crate) fn bake(
     Ok(())
 }
 
-/// What each sample keeps.
-fn redundant(making: &Making, all: &[Panorama<'_>], tree: &Tree, cx: &Context<'_>) -> Result<Vec<Kept>, Fault> {
-    collect(cx.run, all.len(), &|i| {
-        cx.check()?;
-        let ancestors: Vec<&Panorama<'_>> = tree.ancestors(i).map(|a| &all[a]).collect();
-        let pixels = kept(&all[i], &ancestors, making.same_px.unwrap_or(0.0));
-        let points = (0..all[i].pixels()).filter(|&p| all[i].depth(p).is_finite()).count() as u64;
-        Ok(Kept { pixels, points, mended: 0 })
-    })
+/// What each sample keeps, generation by generation, since a sample's borders depend on what its ancestors kept.
+fn redundant(
+    making: &Making,
+    all: &[Panorama<'_>],
+    surfaces: &[Surface],
+    tree: &Tree,
+    cx: &Context<'_>,
+) -> Result<Vec<Kept>, Fault> {
+    let same_px = making.same_px.unwrap_or(0.0);
+    let mut done: Vec<Option<Kept>> = all.iter().map(|_| None).collect();
+    for generation in tree.generations() {
+        let kept = collect(cx.run, generation.len(), &|k| {
+            cx.check()?;
+            let i = generation[k];
+            let ancestors: Vec<&Panorama<'_>> = tree.ancestors(i).map(|a| &all[a]).collect();
+            let mut pixels = kept(&all[i], &ancestors, same_px);
+            let sample = |a: usize| {
+                let keep = done[a].as_ref().map(|k| k.pixels.as_slice())?;
+                Some(Sample { panorama: &all[a], surface: &surfaces[a], keep })
+            };
+            let ancestors: Vec<Sample<'_>> = tree.ancestors(i).filter_map(sample).collect();
+            let mended = if ancestors.is_empty() { 0 } else { mend(&all[i], &mut pixels, &ancestors, same_px) };
+            let points = (0..all[i].pixels()).filter(|&p| all[i].depth(p).is_finite()).count() as u64;
+            Ok(Kept { pixels, points, mended })
+        })?;
+        generation.iter().zip(kept).for_each(|(&i, k)| done[i] = Some(k));
+    }
+    Ok(done.into_iter().flatten().collect())
 }
 
 /// The extreme viewpoints of the region, and the sample's own, relative to it.

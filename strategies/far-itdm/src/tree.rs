@@ -44,6 +44,17 @@ impl Tree {
         Self { parent, order }
     }
 
+    /// The roots, then all samples whose parents are among those, and so on.
+    pub(crate) fn generations(&self) -> Vec<Vec<usize>> {
+        let mut out: Vec<Vec<usize>> = vec![];
+        for &i in &self.order {
+            let depth = self.ancestors(i).count();
+            out.resize_with(out.len().max(depth + 1), Vec::new);
+            out[depth].push(i);
+        }
+        out
+    }
+
     /// A sample's ancestors, its parent first.
     pub(crate) fn ancestors(&self, of: usize) -> impl Iterator<Item = usize> + '_ {
         std::iter::successors(self.parent[of], |&i| self.parent[i])

@@ -190,7 +190,7 @@ mod tests {
     fn a_budget_of_cubes_cuts_a_line_of_ancestors_from_its_end() {
         assert_eq!(drawn(&cubes(Some(3), None), 3.9, |_| true), (vec![0, 2, 4], true, 0));
         assert_eq!(drawn(&cubes(Some(2), None), 3.9, |_| true), (vec![0, 2], true, 0));
-        assert_eq!(drawn(&cubes(Some(5), None), 3.9, |_| true).1, false);
+        assert!(!drawn(&cubes(Some(5), None), 3.9, |_| true).1);
     }
 
     #[test]

@@ -18,7 +18,6 @@ mod fittings;
 mod lattice;
 mod parts;
 mod route;
-mod solid;
 #[cfg(test)]
 mod tests;
 

@@ -9,7 +9,7 @@ use std::f32::consts::TAU;
 use farfield_core::mesh::TriangleMesh;
 use glam::{Affine3A, Vec3};
 
-use super::solid::{Knot, Paint, Solid, frame};
+use crate::generate::solid::{Knot, Paint, Solid, frame};
 
 /// What flows in a pipe: its paint, and radii of the wide and the narrow bore.
 pub(super) struct System {

@@ -219,7 +219,7 @@ fn a_tour_leads_through_the_middle_of_the_pipes() {
         let experiment = crate::config::load(file, &sets, &crate::list::entries()).unwrap();
         let scene = crate::scene::scene(&experiment).unwrap().scene;
         let views = crate::path::views(&experiment.view, &scene);
-        let path = crate::path::cameras(&experiment.view, &views, &scene).unwrap();
+        let path = crate::path::cameras(&experiment.view, &views, &scene, None).unwrap();
         let (low, high) = (scene.bounds.min.y, scene.bounds.max.y);
         let height = (path[0].eye.y as f32 - low) / (high - low);
         assert!((height - 0.5).abs() < 0.01, "{triangles}: an eye at {height} of the height");

@@ -1,6 +1,6 @@
-//! Surfaces of revolution, bends and boxes: what pipe parts are made of.
+//! Surfaces of revolution, bends and boxes: what pipework and much else is made of; [`super::forms`] has softer forms.
 //!
-//! Everything is open where another part joins and closed where it is seen; triangles face outward. A part's frame: the pipe
+//! Everything is open where another part joins and closed where it is seen; triangles face outward. A pipe part's frame: the pipe
 //! runs along x, what sticks out of it (a bend's leg, a tee's branch, a valve's stem) along y. O(triangles).
 
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -15,12 +15,12 @@ pub(super) type Knot = [f32; 2];
 pub(super) type Paint = [u8; 3];
 
 /// Cosine of the least angle of a crease, 35 degrees.
-const CREASE_COS: f32 = 0.82;
+pub(super) const CREASE_COS: f32 = 0.82;
 
 /// A mesh in the making.
 #[derive(Default)]
 pub(super) struct Solid {
-    mesh: TriangleMesh,
+    pub(super) mesh: TriangleMesh,
 }
 
 impl Solid {
@@ -29,7 +29,7 @@ impl Solid {
         self.mesh
     }
 
-    fn vertex(&mut self, p: Vec3, normal: Vec3, paint: Paint) -> u32 {
+    pub(super) fn vertex(&mut self, p: Vec3, normal: Vec3, paint: Paint) -> u32 {
         let m = &mut self.mesh;
         m.positions.push(p);
         m.normals.push(normal);
@@ -153,4 +153,62 @@ impl Solid {
 /// The frame at `origin` whose x axis is `x` and whose y axis is `y`.
 pub(super) fn frame(origin: Vec3, x: Vec3, y: Vec3) -> Affine3A {
     Affine3A::from_mat3_translation(Mat3::from_cols(x, y, x.cross(y)), origin)
+}
+
+/// What tests ask of meshes.
+#[cfg(test)]
+pub(super) mod check {
+    use std::collections::BTreeMap;
+
+    use farfield_core::mesh::{TriangleMesh, position_ids};
+
+    /// The volume of a mesh whose every edge is run through as often one way as the other; the first edge that is not, else.
+    pub(crate) fn closed(mesh: &TriangleMesh) -> Result<f64, String> {
+        let ids = position_ids(&mesh.positions);
+        let mut edges: BTreeMap<(u32, u32), i32> = BTreeMap::new();
+        let mut volume = 0.0;
+        for t in mesh.indices.chunks_exact(3) {
+            let [a, b, c] = [0, 1, 2].map(|k| mesh.positions[t[k] as usize].as_dvec3());
+            volume += a.dot(b.cross(c)) / 6.0;
+            for k in 0..3 {
+                let (a, b) = (ids[t[k] as usize], ids[t[(k + 1) % 3] as usize]);
+                if a != b {
+                    *edges.entry((a.min(b), a.max(b))).or_default() += if a < b { 1 } else { -1 };
+                }
+            }
+        }
+        match edges.iter().find(|e| *e.1 != 0) {
+            Some(((a, b), n)) => {
+                let [a, b] = [a, b].map(|&i| mesh.positions[i as usize]);
+                Err(format!("the edge from {a} to {b} is open by {n}"))
+            }
+            None => Ok(volume),
+        }
+    }
+
+    /// Whether positions and normals are what they should be, normals agree with the faces, and hardly any triangle is
+    /// without area: the first complaint.
+    pub(crate) fn sound(mesh: &TriangleMesh) -> Result<(), String> {
+        if mesh.normals.len() != mesh.positions.len() || mesh.colors.len() != mesh.positions.len() {
+            return Err("an attribute is missing".into());
+        }
+        for (p, n) in mesh.positions.iter().zip(&mesh.normals) {
+            if !p.is_finite() || (n.length() - 1.0).abs() > 1e-3 {
+                return Err(format!("normal {n} at {p}"));
+            }
+        }
+        let (mut flat, mut against) = (0, 0);
+        for t in mesh.indices.chunks_exact(3) {
+            let [a, b, c] = [0, 1, 2].map(|k| mesh.positions[t[k] as usize].as_dvec3());
+            let n = (b - a).cross(c - a);
+            let own: glam::DVec3 = t.iter().map(|&i| mesh.normals[i as usize].as_dvec3()).sum();
+            flat += usize::from(n.length() < 1e-12);
+            against += usize::from(n.length() > 1e-12 && n.dot(own) <= 0.0);
+        }
+        let all = mesh.triangles();
+        if flat > all / 500 || against > all / 500 {
+            return Err(format!("of {all} triangles {flat} are flat, {against} turn away from their normals"));
+        }
+        Ok(())
+    }
 }
