@@ -59,8 +59,17 @@ struct Args {
 fn args() -> Result<Args, Error> {
     let mut words = std::env::args().skip(1).filter(|a| a != "--bench");
     let mode = words.next().unwrap_or_default();
-    let mut out =
-        Args { mode, scene: "house".into(), triangles: 0, cells: 3, px: 512, sampling_px: 128, most: 20, plot: None, set: Default::default() };
+    let mut out = Args {
+        mode,
+        scene: "house".into(),
+        triangles: 0,
+        cells: 3,
+        px: 512,
+        sampling_px: 128,
+        most: 20,
+        plot: None,
+        set: Default::default(),
+    };
     while let Some(word) = words.next() {
         let mut value = || words.next().ok_or(format!("{word} needs a value"));
         match word.as_str() {

@@ -19,6 +19,10 @@ use super::{AROUND, NONE, Panorama};
 /// edge's mid-point hangs before both, at most by the smaller of the two pixels' pieces of wall.
 const PAST_PX: f32 = 2.0;
 
+/// An edge whose 1 / depth is linear to this share of a pixel's width is part of a plane: a step that small is nothing
+/// that another sample could be said to see past.
+const FLAT_PX: f32 = 0.05;
+
 /// The first two tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkinTests {
@@ -40,8 +44,9 @@ impl Joined {
     pub fn new(p: &Panorama<'_>, tests: &SkinTests) -> Self {
         let cos = tests.alpha_rad.cos();
         let points = points(p);
+        let depths: Vec<f32> = p.views().iter().flat_map(|(_, image)| image.depth.iter().copied()).collect();
         let joins = |a: u32, b: u32| {
-            let near = |i: u32| p.depth(i) <= tests.far;
+            let near = |i: u32| depths[i as usize] <= tests.far;
             let (pa, pb) = (points[a as usize], points[b as usize]);
             // Written so that what is not finite does not join.
             let (edge, ray) = (pb - pa, pa + pb);
@@ -49,7 +54,7 @@ impl Joined {
             near(a) && near(b) && pa.is_finite() && pb.is_finite() && edge.dot(ray).abs() <= limit
         };
         let mut out = Self { bits: vec![0; p.pixels() as usize] };
-        out.each_edge(p, |_| true, joins);
+        out.each(p, joins);
         out
     }
 
@@ -61,26 +66,67 @@ impl Joined {
     /// Every edge between pixels that hit something joined: a mesh that keeps its skins.
     pub fn everything(p: &Panorama<'_>) -> Self {
         let mut out = Self::nothing(p);
-        out.each_edge(p, |_| true, |a, b| p.depth(a).is_finite() && p.depth(b).is_finite());
+        out.each(p, |a, b| p.depth(a).is_finite() && p.depth(b).is_finite());
         out
     }
 
     /// Takes away what another sample sees past (test 3).
     pub fn see_past(&mut self, p: &Panorama<'_>, other: &Panorama<'_>) {
-        let moved = (p.eye() - other.eye()).as_vec3();
-        if moved == Vec3::ZERO {
-            return;
-        }
-        let points = points(p);
-        let bits = self.bits.clone();
+        self.see_past_all(p, [other]);
+    }
+
+    /// Takes away what any of several other samples sees past (test 3). Edges in the middle of a plane are surfaces and are not
+    /// asked about, which leaves few: O(pixels), and O(the others' number) for those few.
+    pub fn see_past_all<'o>(&mut self, p: &Panorama<'_>, others: impl IntoIterator<Item = &'o Panorama<'o>>) {
+        self.see_past_beyond(p, others, FLAT_PX);
+    }
+
+    /// As [`Joined::see_past_all`]; edges are asked about when they bend by more than this many pixels' width.
+    pub(super) fn see_past_beyond<'o>(
+        &mut self,
+        p: &Panorama<'_>,
+        others: impl IntoIterator<Item = &'o Panorama<'o>>,
+        flat_px: f32,
+    ) {
         let camera = &p.views()[0].0;
-        let past = PAST_PX * (camera.right_tan - camera.left) / camera.size[0] as f32;
-        let stays = |a: u32, b: u32| {
-            let middle = 0.5 * (points[a as usize] + points[b as usize]);
-            let seen = other.nearest_around(middle + moved);
-            seen.is_none_or(|(least, own)| least <= own + past * middle.length())
-        };
-        self.each_edge(p, |(a, k)| bits[a as usize] >> k & 1 == 1, stays);
+        let pixel = (camera.right_tan - camera.left) / camera.size[0] as f32;
+        let mut asked = self.bent(p, flat_px * pixel);
+        for other in others {
+            let moved = (p.eye() - other.eye()).as_vec3();
+            if moved == Vec3::ZERO {
+                continue;
+            }
+            asked.retain(|(edge, middle)| {
+                let seen = other.nearest_around(middle + moved);
+                let stays = seen.is_none_or(|(least, own)| least <= own + PAST_PX * pixel * middle.length());
+                if !stays {
+                    self.set_both(edge, false);
+                }
+                stays
+            });
+        }
+    }
+
+    /// The joined edges that do not lie in the middle of a plane, and their mid-points. On a plane 1 / depth is linear over a
+    /// picture: a pixel before and one behind the edge are asked.
+    fn bent(&self, p: &Panorama<'_>, flat: f32) -> Vec<(Edge, Vec3)> {
+        let points = points(p);
+        let reciprocal: Vec<f32> =
+            p.views().iter().flat_map(|(_, image)| image.depth.iter().map(|z| z.recip())).collect();
+        let mut out = vec![];
+        each_edge(p, |edge| {
+            if !self.towards(edge.a, edge.towards) {
+                return;
+            }
+            let at = |i: u32| reciprocal[i as usize];
+            // Written so that what is not finite is not level.
+            let level = |before: u32, a: u32, b: u32| (at(before) - 2.0 * at(a) + at(b)).abs() <= flat * at(a);
+            let plane = |[before, behind]: [u32; 2]| level(before, edge.a, edge.b) && level(behind, edge.b, edge.a);
+            if !edge.along(p).is_some_and(plane) {
+                out.push((edge, 0.5 * (points[edge.a as usize] + points[edge.b as usize])));
+            }
+        });
+        out
     }
 
     /// Whether a pixel shares a surface with its neighbour in a direction of [`AROUND`].
@@ -103,36 +149,62 @@ impl Joined {
         (0..p.pixels()).filter(|&a| hit(a)).map(|a| (0..8).filter(|&k| skin(a, k)).count()).sum::<usize>() / 2
     }
 
-    /// Sets the bits of each edge that is asked for, at both ends, to what `joins` says; each edge once, from the smaller pixel.
-    fn each_edge(&mut self, p: &Panorama<'_>, ask: impl Fn((u32, usize)) -> bool, joins: impl Fn(u32, u32) -> bool) {
-        for view in 0..p.views().len() {
-            let [w, h] = p.views()[view].0.size;
-            for y in 0..h {
-                for x in 0..w {
-                    let at = super::Place { view, x, y };
-                    let a = p.pixel(at);
-                    let inner = x > 0 && y > 0 && x + 1 < w && y + 1 < h;
-                    for (k, (dx, dy)) in AROUND.into_iter().enumerate() {
-                        let b = if inner {
-                            (i64::from(a) + i64::from(dy) * i64::from(w) + i64::from(dx)) as u32
-                        } else {
-                            p.beside(at, k)
-                        };
-                        if b == NONE || b < a || !ask((a, k)) {
-                            continue;
-                        }
-                        let back = if inner || p.place(b).view == view { (k + 4) % 8 } else { towards(p, b, a) };
-                        self.set(a, k, joins(a, b));
-                        self.set(b, back, self.towards(a, k));
-                    }
-                }
-            }
-        }
+    /// Sets the bits of each edge, at both ends, to what `joins` says.
+    fn each(&mut self, p: &Panorama<'_>, joins: impl Fn(u32, u32) -> bool) {
+        each_edge(p, |edge| self.set_both(&edge, joins(edge.a, edge.b)));
+    }
+
+    fn set_both(&mut self, edge: &Edge, joined: bool) {
+        self.set(edge.a, edge.towards, joined);
+        self.set(edge.b, edge.back, joined);
     }
 
     fn set(&mut self, pixel: u32, direction: usize, joined: bool) {
         let bits = &mut self.bits[pixel as usize];
         *bits = *bits & !(1 << direction) | u8::from(joined) << direction;
+    }
+}
+
+/// Two neighbouring pixels, the smaller number first.
+#[derive(Clone, Copy)]
+struct Edge {
+    a: u32,
+    b: u32,
+    /// The direction from a to b, and from b to a.
+    towards: usize,
+    back: usize,
+    /// Where a is.
+    at: super::Place,
+}
+
+impl Edge {
+    /// The pixel before a and the one behind b, on one line with both; `None` where the line leaves the picture.
+    fn along(&self, p: &Panorama<'_>) -> Option<[u32; 2]> {
+        let [w, h] = p.views()[self.at.view].0.size.map(|n| n as i32);
+        let (dx, dy) = AROUND[self.towards];
+        let (x, y) = (self.at.x as i32, self.at.y as i32);
+        let inside = |k: i32| (0..w).contains(&(x + k * dx)) && (0..h).contains(&(y + k * dy));
+        let step = dy * w + dx;
+        (inside(-1) && inside(2)).then(|| [self.a.wrapping_add_signed(-step), self.b.wrapping_add_signed(step)])
+    }
+}
+
+/// Calls `f` with each pair of neighbours once.
+fn each_edge(p: &Panorama<'_>, mut f: impl FnMut(Edge)) {
+    for view in 0..p.views().len() {
+        let [w, h] = p.views()[view].0.size;
+        for (x, y) in (0..h).flat_map(|y| (0..w).map(move |x| (x, y))) {
+            let at = super::Place { view, x, y };
+            let a = p.pixel(at);
+            let inner = x > 0 && y > 0 && x + 1 < w && y + 1 < h;
+            for (k, (dx, dy)) in AROUND.into_iter().enumerate() {
+                let b = if inner { a.wrapping_add_signed(dy * w as i32 + dx) } else { p.beside(at, k) };
+                if b != NONE && b > a {
+                    let back = if inner || p.of_view(view).contains(&b) { (k + 4) % 8 } else { towards(p, b, a) };
+                    f(Edge { a, b, towards: k, back, at });
+                }
+            }
+        }
     }
 }
 

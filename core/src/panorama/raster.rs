@@ -189,6 +189,36 @@ impl View {
         self.rect(cut)
     }
 
+    /// The columns of a row in which all three e = n.x t + row may have one sign, and one more on both sides.
+    fn span(&self, rect: &Rect, n: &[DVec3; 3], row: &[f64; 3]) -> [u32; 2] {
+        // Covered where all are >= 0 (a range of t) or all are <= 0 (another): the hull of both.
+        let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
+        for sign in [1.0, -1.0] {
+            let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+            for (n, row) in n.iter().zip(row) {
+                let (slope, start) = (sign * n.x, sign * row);
+                let root = -start / slope;
+                if slope > 0.0 {
+                    low = low.max(root);
+                } else if slope < 0.0 {
+                    high = high.min(root);
+                } else if start < 0.0 {
+                    high = f64::NEG_INFINITY;
+                }
+            }
+            let slack = 1e-9 * (low.abs().min(1e9) + high.abs().min(1e9));
+            if low <= high + slack {
+                (from, to) = (from.min(low), to.max(high));
+            }
+        }
+        let left = self.tx[0];
+        let column = |t: f64| (t - left) * f64::from(self.scale[0]);
+        // Casts saturate.
+        let first = ((column(from) - 1.0).max(0.0) as u32).max(rect.x[0]);
+        let last = ((column(to) + 2.0).max(0.0) as u32).min(rect.x[1]);
+        [first.min(last), last]
+    }
+
     fn fill(&self, c: [Vec3; 3], f: &mut impl FnMut(usize, f32)) {
         if !c.iter().all(|p| p.is_finite()) {
             return;
@@ -201,7 +231,8 @@ impl View {
         for y in rect.y[0]..rect.y[1] {
             let row = n.map(|n: DVec3| n.y * self.ty[y as usize] + n.z);
             let first = self.first + y as usize * self.tx.len();
-            for x in rect.x[0]..rect.x[1] {
+            let columns = if rect.x[1] - rect.x[0] > SHORT { self.span(&rect, &n, &row) } else { rect.x };
+            for x in columns[0]..columns[1] {
                 let tx = self.tx[x as usize];
                 let e = [n[0].x * tx + row[0], n[1].x * tx + row[1], n[2].x * tx + row[2]];
                 let sum = e[0] + e[1] + e[2];
@@ -219,6 +250,9 @@ impl View {
         }
     }
 }
+
+/// Up to this many columns are tried one by one.
+const SHORT: u32 = 4;
 
 fn longest(c: &[Vec3]) -> f32 {
     c.iter().fold(0.0, |m, p| p.abs().max_element().max(m))

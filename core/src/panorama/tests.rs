@@ -135,6 +135,39 @@ fn another_sample_sees_past_a_step_that_one_sample_takes_for_a_surface() {
 }
 
 #[test]
+fn asking_about_every_edge_accuses_none_more_but_planes() {
+    let mut found = 0;
+    for (eye, screen) in [(DVec3::ZERO, Some(3.8)), (DVec3::new(0.5, 0.2, -0.3), Some(3.7)), (DVec3::ZERO, Some(3.0))] {
+        let views = room(eye, HALF, screen, 128);
+        let others = [DVec3::new(3.0, 0.0, 2.5), DVec3::new(2.5, -1.5, -2.0), DVec3::new(-3.0, 1.0, 0.5)];
+        let others = others.map(|e| room(e, HALF, screen, 128));
+        let p = Panorama::new(&views);
+        let others: Vec<Panorama<'_>> = others.iter().map(|v| Panorama::new(v)).collect();
+        let alone = Joined::new(&p, &tests());
+        let (mut bent, mut every) = (alone.clone(), alone.clone());
+        bent.see_past_all(&p, &others);
+        every.see_past_beyond(&p, &others, -1.0);
+        found += every.skins(&p) - alone.skins(&p);
+        // The plane that a point lies on: a wall of the room or the screen.
+        let plane = |i: u32| {
+            let w = p.point(i) + eye.as_vec3();
+            let wall = |k: usize| (w[k].abs() - HALF[k]).abs() < 1e-3;
+            if (w.x - screen.unwrap_or(0.0)).abs() < 1e-3 {
+                Some((3, 1.0))
+            } else {
+                (0..3).find(|&k| wall(k)).map(|k| (k, w[k].signum()))
+            }
+        };
+        for a in 0..p.pixels() {
+            for k in (0..8).filter(|&k| bent.towards(a, k) != every.towards(a, k)) {
+                assert!(bent.towards(a, k) && plane(a).is_some() && plane(a) == plane(p.neighbour(a, k)));
+            }
+        }
+    }
+    assert!(found > 20, "{found}");
+}
+
+#[test]
 fn what_lies_beyond_the_far_threshold_joins_nothing() {
     let views = room(DVec3::ZERO, HALF, None, 8);
     let p = Panorama::new(&views);

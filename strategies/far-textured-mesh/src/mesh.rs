@@ -11,6 +11,7 @@
 //! * A piece under one pixel from everywhere in the cell becomes one small quadrilateral, without any picture.
 //! * A vertex that the mesh shares with chunks outside the piece is locked.
 
+use farfield_core::claim::Quantity;
 use farfield_core::collapse::{Candidate, Collapsed, Cost, LiveMesh, Place, Reach, Settings, collapse};
 use farfield_core::context::{Context, Shot};
 use farfield_core::payload::MeshPart;
@@ -125,8 +126,10 @@ pub(crate) fn simplify(
     let size_px = views[0].camera.size.map(|n| n as f32);
     let mut baked = assemble(own, &mesh, &out, &seen, views);
     baked.passes = verdict.passes;
-    baked.hole_px = verdict.passes.then_some(verdict.claim + erosion_px);
-    baked.error_px = if verdict.passes { verdict.value as f32 } else { own.edge_px };
+    // A test that knows no pixels bounds no hole in pixels.
+    let in_px = verdict.passes && verdict.quantity == Quantity::HoleWidthPx;
+    baked.hole_px = in_px.then_some(verdict.claim + erosion_px);
+    baked.error_px = if in_px { verdict.value as f32 } else { own.edge_px };
     baked.size_px = size_px[0].max(size_px[1]);
     Ok((!baked.parts.is_empty()).then_some(baked))
 }

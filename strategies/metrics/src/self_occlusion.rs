@@ -36,14 +36,23 @@
 //!
 //! Every pixel that lacks a turned-away polygon lies within that of one that is drawn. Limits: it speaks of the polygons before
 //! simplification; the region's extreme points stand for it (a ball's box is a little larger). O(vertices).
+//!
+//! **With several samples** (beyond the paper) a viewpoint is served by the one nearest to it: R is the largest distance of a viewpoint
+//! of the region from its nearest sample, found among the [`solid`] candidates, and the bound holds with t measured from whichever
+//! sample is worst. While s is not under the threshold, the candidate farthest from all samples is the next sample. s speaks of
+//! the whole subject, so that a region touched by geometry asks for ever more: a far field's greatest number of samples ends it.
 
 use farfield_core::Fault;
 use farfield_core::claim::Quantity;
 use farfield_core::context::Context;
+use farfield_core::region::Region;
 use farfield_core::strategy::{Subject, Verdict, VisibilityMetric};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::candidates::{half_spaces, solid};
+use crate::void_surface::{eyes, within};
 
 /// Self-occlusion under a number of pixels.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -84,12 +93,51 @@ fn bound_px(radius: f64, from_region: f64, nearest: f64, depth: f64, stretch: f6
 #[typetag::serde(name = "self-occlusion")]
 impl VisibilityMetric for SelfOcclusion {
     fn judge(&self, subject: &Subject<'_>, _cx: &Context<'_>) -> Result<Verdict, Fault> {
-        if self.max_px.is_nan() || self.max_px < 0.0 {
-            return Err(Fault::Refused(format!("self-occlusion: max_px = {} is no number of pixels", self.max_px)));
-        }
+        self.check()?;
         let (value, claim) = measure(subject);
         Ok(Verdict { value, claim, quantity: Quantity::HoleWidthPx, passes: value < self.max_px })
     }
+
+    fn next(&self, subject: &Subject<'_>, _cx: &Context<'_>) -> Result<Option<Vec3>, Fault> {
+        self.check()?;
+        if measure(subject).0 < self.max_px {
+            return Ok(None);
+        }
+        let eyes = eyes(subject);
+        if eyes.is_empty() {
+            return Ok(Some(subject.cell.outline.centre));
+        }
+        let region = &subject.cell.outline.region;
+        let places = solid(&half_spaces(region), &eyes).into_iter().map(|p| within(region, p.as_vec3()));
+        let farther = |best: Option<(Vec3, f64)>, p: Vec3| {
+            let d = from_nearest(p.as_dvec3(), &eyes);
+            // Of equal ones the first; a sample, after rounding, is none.
+            if best.map_or(d > 0.0, |(_, b)| d > b) { Some((p, d)) } else { best }
+        };
+        Ok(places.fold(None, farther).map(|(p, _)| p))
+    }
+}
+
+impl SelfOcclusion {
+    fn check(&self) -> Result<(), Fault> {
+        if self.max_px.is_nan() || self.max_px < 0.0 {
+            return Err(Fault::Refused(format!("self-occlusion: max_px = {} is no number of pixels", self.max_px)));
+        }
+        Ok(())
+    }
+}
+
+/// The distance to the nearest sample.
+fn from_nearest(p: DVec3, eyes: &[DVec3]) -> f64 {
+    eyes.iter().map(|e| e.distance(p)).fold(f64::INFINITY, f64::min)
+}
+
+/// R: the largest distance of a viewpoint from its nearest sample.
+fn reach(region: &Region, corners: &[Vec3], eyes: &[DVec3]) -> f64 {
+    // The distance from one point is convex: its largest value stands in a corner. From several it may stand between them.
+    let between = if eyes.len() > 1 { solid(&half_spaces(region), eyes) } else { vec![] };
+    let places = between.into_iter().chain(corners.iter().map(|c| c.as_dvec3()));
+    places.map(|p| from_nearest(p, eyes)).fold(0.0, f64::max)
 }
 
 fn measure(subject: &Subject<'_>) -> (f64, f64) {
@@ -99,26 +147,30 @@ fn measure(subject: &Subject<'_>) -> (f64, f64) {
     }
     let Some(corners) = outline.region.corners() else { return (f64::INFINITY, f64::INFINITY) };
     let centre = outline.centre.as_dvec3();
-    let radius = corners.iter().map(|c| c.as_dvec3().distance(centre)).fold(0.0, f64::max);
+    let sampled = eyes(subject);
+    let eyes = if sampled.is_empty() { vec![centre] } else { sampled };
+    let radius = reach(&outline.region, &corners, &eyes);
     let q = f64::from(subject.px_per_tan);
 
     let Some(axis) = (subject.bounds.centre().as_dvec3() - centre).try_normalize() else {
         return (f64::INFINITY, f64::INFINITY);
     };
     let from_centre = |p: &glam::Vec3| -> DVec3 { p.as_dvec3() - centre };
-    let (mut near, mut far, mut farthest) = (f64::INFINITY, f64::NEG_INFINITY, 0f64);
+    let (mut near, mut far) = (f64::INFINITY, f64::NEG_INFINITY);
     for p in subject.facing {
-        let v = from_centre(p);
-        let along = v.dot(axis);
-        (near, far, farthest) = (near.min(along), far.max(along), farthest.max(v.length()));
+        let along = from_centre(p).dot(axis);
+        (near, far) = (near.min(along), far.max(along));
     }
     let value = published_px(radius, near, far - near, q);
 
     let from_region = f64::from(outline.region.distance(&subject.bounds));
-    let nearest = f64::from(subject.bounds.distance(outline.centre));
     let stretch = f64::from(subject.views.half_diagonal_rad()).cos().powi(-2);
-    let depth = (farthest - nearest).max(0.0);
-    (value, bound_px(radius, from_region, nearest, depth, stretch, q))
+    let from = |eye: &DVec3| {
+        let nearest = f64::from(subject.bounds.distance(eye.as_vec3()));
+        let farthest = subject.facing.iter().map(|p| p.as_dvec3().distance(*eye)).fold(0.0, f64::max);
+        bound_px(radius, from_region, nearest, (farthest - nearest).max(0.0), stretch, q)
+    };
+    (value, eyes.iter().map(from).fold(0.0, f64::max))
 }
 
 #[cfg(test)]

@@ -54,17 +54,25 @@ fn views() -> ViewModel {
 }
 
 fn judge(cell: &Cell, facing: &[Vec3], max_px: f64) -> Verdict {
+    sampled(cell, facing, max_px, &[]).0
+}
+
+/// The verdict and the next sample when samples were taken at `eyes`.
+fn sampled(cell: &Cell, facing: &[Vec3], max_px: f64, eyes: &[Vec3]) -> (Verdict, Option<Vec3>) {
     let (views, go) = (views(), AtomicBool::new(false));
+    let taken = |e: &Vec3| (Camera::cube(e.as_dvec3(), 1, 0.1)[0], SurfaceImage::default());
+    let samples: Vec<_> = eyes.iter().map(taken).collect();
     let subject = Subject {
         cell,
         views: &views,
         bounds: Aabb::of(facing.iter().copied()),
         facing,
         px_per_tan: views.px_per_tan(),
-        samples: &[],
+        samples: &samples,
     };
     let cx = Context { capture: &Blind, run: &Serial, memo: &Forget, cancel: &go };
-    SelfOcclusion { max_px }.judge(&subject, &cx).unwrap()
+    let metric = SelfOcclusion { max_px };
+    (metric.judge(&subject, &cx).unwrap(), metric.next(&subject, &cx).unwrap())
 }
 
 proptest! {
@@ -149,4 +157,65 @@ fn the_scale_of_a_scene_does_not_matter() {
         assert!((at(k).value / at(1.0).value - 1.0).abs() < 1e-4);
         assert!((at(k).claim / at(1.0).claim - 1.0).abs() < 1e-4);
     }
+}
+
+#[test]
+fn a_sample_in_the_centre_changes_nothing_and_more_bring_it_under_the_threshold() {
+    let cell = hexagon(10.0);
+    let facing = [Vec3::new(0.0, 0.0, 60.0), Vec3::new(0.0, 0.0, 70.0), Vec3::new(5.0, 2.0, 66.0)];
+    let max_px = 8.0;
+    let (alone, first) = sampled(&cell, &facing, max_px, &[]);
+    assert_eq!(first, Some(Vec3::ZERO));
+    let mut eyes = vec![Vec3::ZERO];
+    assert_eq!(sampled(&cell, &facing, max_px, &eyes).0, alone);
+    let mut values = vec![alone.value];
+    while let (verdict, Some(next)) = sampled(&cell, &facing, max_px, &eyes) {
+        assert!(!verdict.passes && cell.outline.region.contains(next * 0.999), "{next}");
+        // No viewpoint is farther from the samples than the next one.
+        let off = |p: Vec3| eyes.iter().map(|e| e.distance(p)).fold(f32::INFINITY, f32::min);
+        for i in 0..400 {
+            let u = [(i % 20) as f32 / 19.0, (i / 20) as f32 / 19.0, 0.0];
+            assert!(off(cell.outline.region.sample(u).unwrap()) <= off(next) + 1e-3);
+        }
+        eyes.push(next);
+        let (now, _) = sampled(&cell, &facing, max_px, &eyes);
+        values.push(now.value);
+        assert!(eyes.len() < 60, "{values:?}");
+    }
+    println!("{} samples: {values:?}", eyes.len());
+    assert!(values.windows(2).all(|v| v[1] <= v[0]) && values[values.len() - 1] < max_px);
+    // s is R times a number that the samples do not change.
+    assert!((values[0] / alone.value - 1.0).abs() < 1e-9 && eyes.len() > 4);
+}
+
+#[test]
+fn the_claim_with_several_samples_holds_for_the_nearest_one() {
+    let cell = hexagon(10.0);
+    let b = Aabb { min: Vec3::new(-8.0, 0.0, 40.0), max: Vec3::new(8.0, 6.0, 60.0) };
+    let eyes = [Vec3::new(5.0, 0.0, -4.0), Vec3::new(-5.0, 0.0, -4.0), Vec3::new(0.0, 0.0, 5.0)];
+    let (verdict, _) = sampled(&cell, &b.corners(), 5.0, &eyes);
+    let one = judge(&cell, &b.corners(), 5.0);
+    assert!(verdict.claim < one.claim && verdict.value < one.value);
+    let mut worst = 0f32;
+    for i in 0..4000u32 {
+        let u = |k: u32| (i.wrapping_mul(2654435761).wrapping_add(k.wrapping_mul(40503)) >> 8) as f32 % 1000.0 / 1000.0;
+        let eye = cell.outline.region.sample([u(1), u(2), u(3)]).unwrap();
+        let sample = eyes.into_iter().min_by(|p, q| p.distance(eye).total_cmp(&q.distance(eye))).unwrap();
+        // Two points of the box on one ray from the sample.
+        let through = b.min + b.size() * Vec3::new(u(4), u(5), u(6)) - sample;
+        let (mut enter, mut leave) = (0f32, f32::INFINITY);
+        for k in 0..3 {
+            let (p, q) = ((b.min[k] - sample[k]) / through[k], (b.max[k] - sample[k]) / through[k]);
+            (enter, leave) = (enter.max(p.min(q)), leave.min(p.max(q)));
+        }
+        let camera =
+            Camera::looking(eye.as_dvec3(), (b.centre() - eye).normalize(), Vec3::Y, views().fov_y_rad, [1024; 2], 0.1);
+        let shown = |q: &Vec3| (0.0..1024.0).contains(&q.x) && (0.0..1024.0).contains(&q.y);
+        let at = |t: f32| camera.project(sample + through * t - eye).filter(shown);
+        if let (Some(p), Some(q)) = (at(enter), at(leave)) {
+            worst = worst.max(p.truncate().distance(q.truncate()));
+        }
+    }
+    println!("{worst} px of {} claimed", verdict.claim);
+    assert!(f64::from(worst) <= verdict.claim && f64::from(worst) > 0.1 * verdict.claim);
 }

@@ -18,12 +18,13 @@
 //! endless space of which nothing is known behind a silhouette either: what stands alone before the sky has a void though
 //! nothing may be there.
 //!
-//! **F is an estimate.** Test 2 marks surfaces seen at a grazing angle that were seen (F too large); a hole narrower than a pixel of a sample is
+//! **F is an estimate.** A ray that passes through unknown space to a surface that some sample saw counts: something might stand
+//! there (F too large; among hanging blocks by a fifth to a half). Test 2 marks surfaces seen at a grazing angle that were seen (F too large); a hole narrower than a pixel of a sample is
 //! unknown (too small); between the candidates F may be larger. The claim is the value itself, and an audit may refute it. Beside the
 //! pictures of a sample that is no whole cube nothing is known and nothing counted.
 //!
-//! Cost: O(n^2 p) for n samples of p pixels (test 3), then for every candidate O(n p) at worst; only where walls of all samples
-//! overlap are surfaces drawn. A sample holds some 50 bytes a pixel meanwhile.
+//! Cost: O(n p) for n samples of p pixels, O(n^2) for edges that bend (test 3), then for every candidate O(n p) at worst; surfaces
+//! are drawn only where walls of all samples overlap. A sample holds some 50 bytes a pixel meanwhile.
 //!
 //! [`Joined`]: farfield_core::panorama::Joined
 //! [`Surface::walls`]: farfield_core::panorama::Surface::walls

@@ -3,7 +3,7 @@
 use farfield_core::context::{Context, collect};
 use farfield_core::image::SurfaceImage;
 use farfield_core::panorama::raster::Raster;
-use farfield_core::panorama::{Joined, NONE, Panorama, SkinTests, Surface, pixel_solid_angle_sr};
+use farfield_core::panorama::{Joined, NONE, Panorama, Place, SkinTests, Surface, pixel_solid_angle_sr};
 use farfield_core::{Aabb, Camera, Fault};
 use glam::DVec3;
 
@@ -53,11 +53,9 @@ impl Voids {
         let panoramas = Panorama::group(samples);
         let samples = collect(cx.run, panoramas.len(), &|i| {
             let own = &panoramas[i];
+            cx.check()?;
             let mut joined = Joined::new(own, tests);
-            for other in panoramas.iter().filter(|o| o.eye() != own.eye()) {
-                cx.check()?;
-                joined.see_past(own, other);
-            }
+            joined.see_past_all(own, panoramas.iter().filter(|o| o.eye() != own.eye()));
             Ok(Sample::new(own, &joined, &bounds))
         })?;
         Ok(Self { samples, bounds })
@@ -141,7 +139,10 @@ fn solid_angle(face: &Camera, mask: &[bool]) -> f64 {
     let [w, h] = face.size;
     let weights: Vec<f64> =
         (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| pixel_solid_angle_sr(face, x, y)).collect();
-    mask.chunks(weights.len()).flat_map(|m| m.iter().zip(&weights)).filter(|(m, _)| **m).map(|(_, w)| w).sum()
+    mask.chunks(weights.len())
+        .flat_map(|m| m.iter().zip(&weights))
+        .filter(|(m, _)| **m)
+        .fold(0.0, |sum, (_, w)| sum + w)
 }
 
 impl Sample {
@@ -159,13 +160,29 @@ impl Sample {
         });
         let wall_count = keyed.len();
         let walls = Patches::new(points, keyed);
-        let pixel = |i: u32| {
-            let at = p.place(i);
-            Some((key(p, at.view, at.x, at.y), surface.quads[i as usize])).filter(|(_, q)| q[0] != NONE)
-        };
-        let keyed = (0..p.pixels()).filter_map(pixel).collect();
+        let mut keyed = Vec::with_capacity(surface.quads.len());
+        for at in by_patch(p) {
+            let quad = surface.quads[p.pixel(at) as usize];
+            if quad[0] != NONE {
+                keyed.push((key(p, at.view, at.x, at.y), quad));
+            }
+        }
         Self { eye: p.eye(), surface: Patches::new(surface.points, keyed), walls, wall_count }
     }
+}
+
+/// All pixels, square by square.
+fn by_patch<'a>(p: &'a Panorama<'_>) -> impl Iterator<Item = Place> + 'a {
+    let squares = |n: u32| (0..n.div_ceil(PATCH)).map(move |i| i * PATCH..((i + 1) * PATCH).min(n));
+    (0..p.views().len()).flat_map(move |view| {
+        let [w, h] = p.views()[view].0.size;
+        squares(h).flat_map(move |rows| {
+            squares(w).flat_map(move |columns| {
+                let row = move |y| columns.clone().map(move |x| Place { view, x, y });
+                rows.clone().flat_map(row)
+            })
+        })
+    })
 }
 
 /// The number of a pixel's square.
@@ -174,4 +191,22 @@ fn key(p: &Panorama<'_>, view: usize, x: u32, y: u32) -> u32 {
     let before: u32 =
         p.views()[..view].iter().map(|(c, _)| c.size[0].div_ceil(PATCH) * c.size[1].div_ceil(PATCH)).sum();
     before + y / PATCH * columns + x / PATCH
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mask_of_all_pixels_is_all_around_whatever_their_number() {
+        for px in [8, 33, 128, 512] {
+            let face = Camera::cube(DVec3::ZERO, px, 0.1)[0];
+            let n = (6 * px * px) as usize;
+            let all = solid_angle(&face, &vec![true; n]);
+            assert!((all / (4.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6, "{all}");
+            let half = solid_angle(&face, &[vec![true; n / 2], vec![false; n / 2]].concat());
+            assert!((half / all - 0.5).abs() < 1e-12);
+            assert_eq!(solid_angle(&face, &vec![false; n]), 0.0);
+        }
+    }
 }

@@ -66,6 +66,26 @@ pub(crate) fn furnished() -> Vec<Sheet> {
     out
 }
 
+/// A room of 60 x 20 x 60 with blocks that hang in the air, none within 9 of the origin.
+pub(crate) fn hanging(n: usize) -> Vec<Sheet> {
+    let mut out = sides(Vec3::new(-30.0, -5.0, -30.0), Vec3::new(30.0, 15.0, 30.0));
+    let mut state = 1u32;
+    let mut random = |low: f32, high: f32| {
+        state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+        low + (high - low) * (state >> 8) as f32 / 16777216.0
+    };
+    let mut placed = 0;
+    while placed < n {
+        let at = Vec3::new(random(-27.0, 27.0), random(-4.0, 12.0), random(-27.0, 27.0));
+        let size = Vec3::from([(); 3].map(|()| random(0.5, 3.0)));
+        if at.length() > 9.0 + 3.0 {
+            out.extend(sides(at, at + size));
+            placed += 1;
+        }
+    }
+    out
+}
+
 impl World {
     pub(crate) fn new(sheets: &[Sheet], scale: f32) -> Self {
         let mut m = TriangleMesh::default();
@@ -77,7 +97,7 @@ impl World {
         }
         m.sections = vec![(0..m.indices.len() as u32, MaterialId(0))];
         let mut b = SceneBuilder::default();
-        b.materials.push(Material::default());
+        b.materials.push(Material { two_sided: true, ..Material::default() });
         let bvh = TriangleBvh::build(&m.positions, &m.indices);
         let mesh = b.mesh("room", m).unwrap();
         b.place(Placement { mesh, transform: DAffine3::IDENTITY });
@@ -129,6 +149,27 @@ impl World {
                 let ray = Ray::new(at, direction, self.near(), f32::INFINITY).unwrap();
                 let hit = self.bvh.closest_hit(&ray, |_| true).map(|h| at + direction.as_dvec3() * f64::from(h.t));
                 out.push(hit.is_some_and(|p| samples.iter().all(|s| !self.sees((*s * self.scale).as_dvec3(), p))));
+            }
+        }
+        out
+    }
+
+    /// By points along rays: for each pixel around `eye` whether every sample loses sight of the ray before it hits anything,
+    /// be it each of another piece.
+    pub(crate) fn truly_void(&self, eye: Vec3, samples: &[Vec3], face_px: u32) -> Vec<bool> {
+        let at = (eye * self.scale).as_dvec3();
+        let raster = Raster::new(&Camera::cube(at, face_px, self.near()));
+        let mut out = vec![];
+        for view in 0..6 {
+            for i in 0..face_px * face_px {
+                let direction = raster.ray(view, i % face_px, i / face_px);
+                let ray = Ray::new(at, direction, self.near(), f32::INFINITY).unwrap();
+                let end = self.bvh.closest_hit(&ray, |_| true).map_or(0.0, |h| f64::from(h.t));
+                let lost = |s: &Vec3| {
+                    let s = (*s * self.scale).as_dvec3();
+                    (1..400).any(|k| !self.sees(s, at + direction.as_dvec3() * (end * f64::from(k) / 400.0)))
+                };
+                out.push(samples.iter().all(lost));
             }
         }
         out
