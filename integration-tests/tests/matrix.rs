@@ -23,14 +23,28 @@ const VARIANTS: [(&str, &str); 3] = [
 ];
 
 /// Far fields whose defaults are meant for larger pictures than these.
-const FITTED: [(&str, &str); 2] =
-    [("static-lod", "max_px = 2.0, max_albedo_off = 64"), ("textured-lod-mesh", "edge_px = 1.0")];
+const FITTED: [(&str, &str); 4] = [
+    ("incremental-tdm", "face_px = 192, sampling_px = 48"),
+    ("static-lod", "max_px = 2.0, max_albedo_off = 64"),
+    ("textured-depth-mesh", "face_px = 192"),
+    ("textured-lod-mesh", "edge_px = 1.0"),
+];
 
 /// Combinations that are refused: partition, far field, and what the refusal must say. All others have to run.
-const REFUSED: [(&str, &str, [&str; 3]); 2] = [
+const REFUSED: [(&str, &str, [&str; 3]); 4] = [
+    (
+        "{ type = \"single-cell\" }",
+        "incremental-tdm",
+        ["pipeline \"tested\"", "meets the viewpoints of cell 0", "give the partition a region"],
+    ),
     (
         "{ type = \"single-cell\" }",
         "layered-depth-image",
+        ["pipeline \"tested\"", "meets the viewpoints of cell 0", "give the partition a region"],
+    ),
+    (
+        "{ type = \"single-cell\" }",
+        "textured-depth-mesh",
         ["pipeline \"tested\"", "meets the viewpoints of cell 0", "give the partition a region"],
     ),
     (
