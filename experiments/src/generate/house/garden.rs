@@ -165,7 +165,7 @@ pub(super) fn garden() -> Vec<Thing> {
     out.push(thing("hedge", hedges, |m| hedge(m, 6.4, 1.7, 5)));
     let fences = (0..16).map(|k| -r + 1.0 + 2.0 * f64::from(k)).filter(|z| (z - 5.0).abs() > 1.2);
     out.push(thing("fence", fences.map(|z| on_ground(w + r - 0.4, z, 90.0)).collect(), fence));
-    let greens: [Paint; 3] = [[84, 124, 52], [104, 138, 62], [66, 110, 58]];
+    let greens: [Paint; 3] = [[104, 148, 66], [128, 160, 78], [88, 138, 74]];
     let trees: [&[(f64, f64, f64)]; 3] = [
         &[(-6.5, 3.0, 0.0), (10.6, -6.4, 100.0), (19.6, -4.0, 30.0)],
         &[(-5.6, 14.5, 60.0), (3.0, -6.8, 210.0), (21.5, 13.0, 0.0)],

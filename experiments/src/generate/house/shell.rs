@@ -83,7 +83,7 @@ fn light(room: Room, windows: &[(Vec3, f32)], p: Vec3, n: Vec3) -> f32 {
             0.55 * area * (d.dot(n) / d.length().max(0.2)).max(0.0) / (d.length_squared() + 0.7)
         })
         .sum();
-    ((0.74 + sky.min(0.26)) * (1.0 - dark.min(0.5))).min(1.0)
+    ((0.85 + sky.min(0.15)) * (1.0 - dark.min(0.5))).min(1.0)
 }
 
 /// The middles and areas of the openings to the outside of a room.
@@ -130,6 +130,8 @@ fn wall_faces(s: &mut Solid, wall: &Wall, heights: &[f32], step: f32, room: Opti
     };
     // The floor of a door's opening is the room's; walls run on below it.
     let seen = |p: Vec3| Room::at(Vec2::new(p.x, p.z)) == room;
+    // Reveals of outside walls belong to the room.
+    let inner = if wall.line == 0.0 { 0.02 * half } else { -0.02 * half };
     let (axis, across) = if wall.along_x { (Vec3::X, Vec3::Z) } else { (Vec3::Z, Vec3::X) };
     for u in along.windows(2) {
         for v in heights.windows(2) {
@@ -146,13 +148,13 @@ fn wall_faces(s: &mut Solid, wall: &Wall, heights: &[f32], step: f32, room: Opti
             let offs = [-half, half];
             for (at, to, normal) in [(u[0], mu - (u[1] - u[0]), -axis), (u[1], mu + (u[1] - u[0]), axis)] {
                 let open = hole(at + (to - at).signum() * 1e-3, mv) || at == wall.span[0] || at == wall.span[1];
-                if open && seen(wall.point(at, mv, 0.02 * half) + normal * 0.01) {
+                if open && seen(wall.point(at, mv, inner) + normal * 0.01) {
                     patch(s, &offs, v, normal, paint, |o, b| wall.point(at, b, o));
                 }
             }
             for (at, normal) in [(v[0], Vec3::NEG_Y), (v[1], Vec3::Y)] {
                 let open = hole(mu, at + normal.y * 1e-3) || at == FOOT || at == TOP;
-                if open && seen(wall.point(mu, at, 0.02 * half)) {
+                if open && seen(wall.point(mu, at, inner)) {
                     patch(s, u, &offs, normal, paint, |a, o| wall.point(a, at, o));
                 }
             }

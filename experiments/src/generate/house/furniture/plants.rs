@@ -117,15 +117,11 @@ fn foliage(m: &mut Model, at: Vec3, radii: Vec3, paint: Paint, rng: &mut ChaCha8
             let Some(d) = d.try_normalize() else { continue };
             let foot = at + d * radii * rng.random_range(0.86..1.0);
             let off = Vec3::new(rng.random_range(-0.6..0.6), rng.random_range(-0.5..0.5), rng.random_range(-0.6..0.6));
-            let size = rng.random_range(0.6..1.2) * (0.10 + 0.3 / m_level(n));
-            let lit = rng.random_range(0.8..1.25) * (0.9 + 0.25 * d.y);
+            let size = rng.random_range(0.6..1.2) * (0.13 + 0.7 / n as f32);
+            let lit = rng.random_range(0.95..1.5) * (1.0 + 0.3 * d.y);
             leaf(s, foot, foot + (d + off).normalize() * size, 0.45 * size, shade(paint, lit));
         }
     });
-}
-
-fn m_level(n: u32) -> f32 {
-    n as f32
 }
 
 /// A tree of seeded shape, about `high` high: a bent trunk, branches, and foliage at their ends.
