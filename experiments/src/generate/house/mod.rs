@@ -44,7 +44,7 @@ pub const MOST_HOUSE: u64 = 4_000_000;
 pub const HOUSE_EYE: f64 = 1.6 - garden::BOTTOM as f64;
 
 /// Lowest and highest level of detail.
-const LEVELS: [u32; 2] = [1, 60];
+const LEVELS: [u32; 2] = [0, 60];
 
 /// What house to make.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

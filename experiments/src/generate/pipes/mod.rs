@@ -31,8 +31,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::GenerateError;
-use lattice::Lattice;
 pub(super) use fittings::Placed;
+use lattice::Lattice;
 pub(super) use parts::Part;
 
 use parts::FAMILIES;
@@ -125,7 +125,12 @@ pub fn pipes(settings: &PipesSettings) -> Result<PipesScene, GenerateError> {
 
 /// Pipes through the free cells of a box of cells one unit wide, about `pipe_cells` of them, for other generators: as [`pipes`], without
 /// vessels, steel and galleries. The box stands on y = 0 with its middle at x = z = 0.
-pub(super) fn pipework(size: IVec3, taken: impl Fn(IVec3) -> bool, pipe_cells: usize, rng: &mut ChaCha8Rng) -> Vec<Placed> {
+pub(super) fn pipework(
+    size: IVec3,
+    taken: impl Fn(IVec3) -> bool,
+    pipe_cells: usize,
+    rng: &mut ChaCha8Rng,
+) -> Vec<Placed> {
     let mut lattice = Lattice::bare(size);
     let range = |k: usize| 0..size[k];
     for x in range(0) {

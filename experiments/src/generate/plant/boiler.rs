@@ -67,7 +67,12 @@ pub(super) fn drum(s: &mut Solid, level: u32) {
     for x in [-7.0, -3.5, 0.0, 3.5, 7.0] {
         let ring = [[x - 0.12, 0.98], [x - 0.12, 1.1], [x + 0.12, 1.1], [x + 0.12, 0.98]];
         s.lathe(at, 3 * sides(level), STEEL, &ring);
-        s.lathe(up(x + 0.8, 0.9, 0.0), sides(level), STEEL, &[[0.0, 0.25], [1.0, 0.25], [1.0, 0.4], [1.12, 0.4], [1.12, 0.0]]);
+        s.lathe(
+            up(x + 0.8, 0.9, 0.0),
+            sides(level),
+            STEEL,
+            &[[0.0, 0.25], [1.0, 0.25], [1.0, 0.4], [1.12, 0.4], [1.12, 0.0]],
+        );
     }
     let count = 12 + 4 * level.min(10);
     let bend = 3 + level.min(8);
@@ -89,7 +94,8 @@ pub(super) fn drum(s: &mut Solid, level: u32) {
 pub(super) fn downcomer(s: &mut Solid, level: u32) {
     let n = 2 * sides(level);
     s.lathe(up(0.0, 0.0, 0.0), n, [204, 204, 200], &[[0.0, 0.4], [STOREY, 0.4]]);
-    for y in [0.02, 2.5] {
+    let bands: &[f32] = if level < 2 { &[] } else { &[0.02, 2.5] };
+    for y in bands.iter().copied() {
         s.lathe(up(0.0, 0.0, 0.0), n, STEEL, &[[y, 0.39], [y, 0.46], [y + 0.12, 0.46], [y + 0.12, 0.39]]);
     }
 }

@@ -85,7 +85,7 @@ pub(super) fn layout(share: f64, rng: &mut ChaCha8Rng) -> (Vec<Placed>, Space) {
     (out, space)
 }
 
-/// Ground, columns and beams.
+/// Ground, columns, beams, and cladding to the north and west.
 fn frame(out: &mut Vec<Placed>, space: &mut Space) {
     let half = EDGE + 4.0;
     out.push(part("ground", vec![DAffine3::IDENTITY], move |s, level| {
@@ -95,7 +95,11 @@ fn frame(out: &mut Vec<Placed>, space: &mut Space) {
             for i in 0..n {
                 let c = Vec3::new((i as f32 + 0.5) * edge - half, -0.25, (j as f32 + 0.5) * edge - half);
                 let tone = 138 + (20.0 * crate::generate::noise::unit(i as i32, j as i32, 3)) as u8;
-                s.block(glam::Affine3A::from_translation(c), Vec3::new(0.5 * edge, 0.25, 0.5 * edge), [tone, tone, tone - 6]);
+                s.block(
+                    glam::Affine3A::from_translation(c),
+                    Vec3::new(0.5 * edge, 0.25, 0.5 * edge),
+                    [tone, tone, tone - 6],
+                );
             }
         }
     }));
@@ -129,6 +133,17 @@ fn frame(out: &mut Vec<Placed>, space: &mut Space) {
     out.push(part("column", columns, |s, level| steel::column(s, level, 10.0)));
     across.extend(along);
     out.push(part("beam", across, |s, level| steel::beam(s, level, 9.98, 0.45)));
+    // Two walls from the eighth storey up: around the bunkers.
+    let mut sheets = vec![];
+    for i in 0..BAYS {
+        let middle = line(i) + 4.5;
+        for storey in 8..STOREYS {
+            let y = floor_of(storey);
+            sheets.push(put(middle, y, -EDGE - 0.85, 2));
+            sheets.push(put(-EDGE - 0.85, y, middle, 3));
+        }
+    }
+    out.push(part("cladding", sheets, steel::cladding));
 }
 
 /// The boiler.
@@ -183,14 +198,20 @@ fn fire(out: &mut Vec<Placed>, space: &mut Space) {
 fn flue(out: &mut Vec<Placed>, space: &mut Space) {
     let [x, z] = STACK;
     let rings = |banded: bool| (0..16).filter(move |k| (*k >= 12 && k % 2 == 0) == banded);
-    out.push(part("stack", rings(false).map(|k| put(x, floor_of(k), z, 0)).collect(), |s, l| boiler::stack(s, l, false)));
-    out.push(part("stack, red", rings(true).map(|k| put(x, floor_of(k), z, 0)).collect(), |s, l| boiler::stack(s, l, true)));
+    out.push(part("stack", rings(false).map(|k| put(x, floor_of(k), z, 0)).collect(), |s, l| {
+        boiler::stack(s, l, false)
+    }));
+    out.push(part("stack, red", rings(true).map(|k| put(x, floor_of(k), z, 0)).collect(), |s, l| {
+        boiler::stack(s, l, true)
+    }));
     out.push(part("stack mouth", vec![put(x, 80.0, z, 0)], boiler::mouth));
     space.take(Vec3::new(x - 3.0, 0.0, z - 3.0), Vec3::new(x + 3.0, 80.0, z + 3.0));
     // High out of the boiler to the east, down beside it, low to the stack.
     let (dx, dz) = (6.0, -4.2);
-    let upright = |y: f32| DAffine3::from_translation(glam::DVec3::new(dx.into(), y.into(), dz.into()))
-        * DAffine3::from_rotation_z(std::f64::consts::FRAC_PI_2);
+    let upright = |y: f32| {
+        DAffine3::from_translation(glam::DVec3::new(dx.into(), y.into(), dz.into()))
+            * DAffine3::from_rotation_z(std::f64::consts::FRAC_PI_2)
+    };
     let falls: Vec<DAffine3> = (3..12).map(|k| upright(floor_of(k) + 2.5)).collect();
     out.push(part("duct, upright", falls, |s, l| machines::duct(s, l, 5.0, 4.4)));
     space.take(Vec3::new(dx - 2.5, 10.0, dz - 2.5), Vec3::new(dx + 2.5, 65.0, dz + 2.5));
@@ -235,7 +256,8 @@ fn walkways(out: &mut Vec<Placed>, space: &mut Space, share: f64, rng: &mut ChaC
             for j in 0..BAYS {
                 for turn in 0..2 {
                     // The middle of the 8 m after the node, along x or along z.
-                    let (x, z) = if turn == 0 { (line(i) + 6.0, line(j) + 1.0) } else { (line(i) + 1.0, line(j) + 6.0) };
+                    let (x, z) =
+                        if turn == 0 { (line(i) + 6.0, line(j) + 1.0) } else { (line(i) + 1.0, line(j) + 6.0) };
                     let half = if turn == 0 { Vec3::new(4.0, 0.0, 1.0) } else { Vec3::new(1.0, 0.0, 4.0) };
                     let (low, high) = (Vec3::new(x, y, z) - half, Vec3::new(x, y + 3.0, z) + half);
                     if !rng.random_bool(keep) || !space.free(low, high) {
@@ -266,7 +288,8 @@ fn walkways(out: &mut Vec<Placed>, space: &mut Space, share: f64, rng: &mut ChaC
             }
         }
     }
-    let placed: Vec<(DAffine3, f32)> = gratings.iter().map(|&p| (p, 4.0)).chain(nodes.iter().map(|&p| (p, 1.0))).collect();
+    let placed: Vec<(DAffine3, f32)> =
+        gratings.iter().map(|&p| (p, 4.0)).chain(nodes.iter().map(|&p| (p, 1.0))).collect();
     for (p, long) in placed {
         let c = p.translation.as_vec3();
         let turned = p.transform_vector3(glam::DVec3::X).x.abs() < 0.5;
@@ -300,10 +323,10 @@ fn bays(out: &mut Vec<Placed>, space: &mut Space, share: f64, rng: &mut ChaCha8R
             for j in 0..BAYS {
                 let (x, z, y) = (line(i) + 5.8, line(j) + 5.8, floor_of(storey));
                 let (low, high) = (Vec3::new(x - 3.4, y, z - 3.4), Vec3::new(x + 3.4, y + 4.0, z + 3.4));
-                let (kind, quarters) = (rng.random_range(0..14), rng.random_range(0..4));
+                let (kind, quarters) = (rng.random_range(0..11), rng.random_range(0..4));
                 // Near the boiler and on the route's storey machines are denser.
-                let near = (x - BOILER.x).abs().max((z - BOILER.z).abs()) < 20.0 && (storey - ROUTE_STOREY).abs() < 2;
-                let keep = if near { (1.6 * share + 0.15).min(1.0) } else { share };
+                let near = (x - BOILER.x).abs().max((z - BOILER.z).abs()) < 20.0 && (storey - ROUTE_STOREY).abs() < 3;
+                let keep = if near { share.sqrt() } else { share };
                 if !rng.random_bool(keep) || kind >= kinds.len() || !space.free(low, high) {
                     continue;
                 }

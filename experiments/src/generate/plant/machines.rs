@@ -163,7 +163,10 @@ pub(super) fn bank(s: &mut Solid, level: u32) {
 pub(super) fn headers(s: &mut Solid, level: u32) {
     let n = 3 + level.min(16);
     let count = 6 + 3 * level.min(12);
-    for (i, (z, r, top)) in [(-2.2, 0.28, 3.6), (-1.1, 0.2, 3.1), (0.0, 0.34, 3.8), (1.1, 0.2, 3.1), (2.2, 0.28, 3.6)].into_iter().enumerate() {
+    for (i, (z, r, top)) in [(-2.2, 0.28, 3.6), (-1.1, 0.2, 3.1), (0.0, 0.34, 3.8), (1.1, 0.2, 3.1), (2.2, 0.28, 3.6)]
+        .into_iter()
+        .enumerate()
+    {
         let paint: Paint = [[186, 188, 190], [160, 104, 70]][i % 2];
         for y in [0.6, top] {
             s.lathe(along(0.0, y, z), sides(level) + 4, paint, &shell(-3.0, 3.0, r, level));
@@ -222,7 +225,12 @@ pub(super) fn fan(s: &mut Solid, level: u32) {
     outline.dedup_by(|a, b| a.distance(*b) < 1e-4);
     let side = to(-0.6, 1.95, 0.0) * Affine3A::from_rotation_z(-FRAC_PI_2);
     s.prism(side, &outline, glam::Vec2::ZERO, [0.0, 1.2], paint);
-    s.lathe(along(0.6, 1.95, 0.0), 2 * n, STEEL, &[[0.0, 0.7], [0.1, 0.72], [0.6, 0.95], [0.65, 0.95], [0.55, 0.7], [0.02, 0.5], [0.02, 0.0]]);
+    s.lathe(
+        along(0.6, 1.95, 0.0),
+        2 * n,
+        STEEL,
+        &[[0.0, 0.7], [0.1, 0.72], [0.6, 0.95], [0.65, 0.95], [0.55, 0.7], [0.02, 0.5], [0.02, 0.0]],
+    );
     bar(s, [-2.6, 0.0, -1.0], [1.4, 0.3, 1.0], BASE);
     s.lathe(along(-1.7, 1.95, 0.0), 2 * n, [44, 96, 150], &shell(-0.9, 0.9, 0.5, level));
     bar(s, [-2.4, 0.3, -0.45], [-1.0, 1.55, 0.45], BASE);
@@ -252,12 +260,17 @@ pub(super) fn mill(s: &mut Solid, level: u32) {
     s.lathe(up(0.0, 0.0, 0.0), n, [122, 98, 84], &body);
     for k in 0..3 {
         let (sn, c) = (TAU * k as f32 / 3.0).sin_cos();
-        let at = frame(Vec3::new(1.6 * c, 1.5, 1.6 * sn), Vec3::new(c, 0.25, sn).normalize(), Vec3::new(-0.25 * c, 1.0, -0.25 * sn).normalize());
+        let at = frame(
+            Vec3::new(1.6 * c, 1.5, 1.6 * sn),
+            Vec3::new(c, 0.25, sn).normalize(),
+            Vec3::new(-0.25 * c, 1.0, -0.25 * sn).normalize(),
+        );
         nozzle(s, at, 0.5, 1.1, level, [150, 120, 96]);
     }
     for k in 0..4 {
         let (sn, c) = (TAU * (k as f32 + 0.5) / 4.0).sin_cos();
-        let line = [[0.6 * c, 5.9, 0.6 * sn], [0.9 * c, 6.8, 0.9 * sn], [1.3 * c, 7.6, 1.3 * sn], [1.3 * c, 9.3, 1.3 * sn]];
+        let line =
+            [[0.6 * c, 5.9, 0.6 * sn], [0.9 * c, 6.8, 0.9 * sn], [1.3 * c, 7.6, 1.3 * sn], [1.3 * c, 9.3, 1.3 * sn]];
         s.sweep(&line.map(Vec3::from), sides(level), [128, 120, 112], |_| 0.28);
     }
     bar(s, [2.0, 0.0, -0.8], [3.1, 1.2, 0.8], [44, 96, 150]);
@@ -285,16 +298,38 @@ pub(super) fn turbine(s: &mut Solid, level: u32) {
     ];
     s.lathe(along(0.0, 2.6, 0.0), n, [196, 198, 190], &casing);
     for x in [-6.4, -3.3, -1.4, -0.5] {
-        let r = if x < -5.0 { 1.3 } else if x < -3.0 { 1.86 } else { 2.1 };
+        let r = if x < -5.0 {
+            1.3
+        } else if x < -3.0 {
+            1.86
+        } else {
+            2.1
+        };
         let joint = [[x - 0.12, r - 0.1], [x - 0.12, r + 0.12], [x + 0.12, r + 0.12], [x + 0.12, r - 0.1]];
         s.lathe(along(0.0, 2.6, 0.0), n, STEEL, &joint);
     }
-    let generator = [[1.7, 0.0], [1.7, 0.5], [2.2, 0.5], [2.2, 1.6], [2.5, 1.75], [7.3, 1.75], [7.6, 1.6], [7.6, 0.6], [8.3, 0.6], [8.3, 0.0]];
+    let generator = [
+        [1.7, 0.0],
+        [1.7, 0.5],
+        [2.2, 0.5],
+        [2.2, 1.6],
+        [2.5, 1.75],
+        [7.3, 1.75],
+        [7.6, 1.6],
+        [7.6, 0.6],
+        [8.3, 0.6],
+        [8.3, 0.0],
+    ];
     s.lathe(along(0.0, 2.6, 0.0), n, [64, 110, 150], &generator);
     let ribs = 4 + level.min(12);
     for k in 0..ribs {
         let x = 2.8 + 4.2 * k as f32 / (ribs - 1) as f32;
-        s.lathe(along(0.0, 2.6, 0.0), n, [56, 98, 134], &[[x - 0.04, 1.74], [x - 0.04, 1.85], [x + 0.04, 1.85], [x + 0.04, 1.74]]);
+        s.lathe(
+            along(0.0, 2.6, 0.0),
+            n,
+            [56, 98, 134],
+            &[[x - 0.04, 1.74], [x - 0.04, 1.85], [x + 0.04, 1.85], [x + 0.04, 1.74]],
+        );
     }
     for (x, r) in [(-6.6, 0.3), (-5.9, 0.3), (-2.9, 0.5), (-1.2, 0.5)] {
         for z in [-0.6, 0.6] {

@@ -50,10 +50,10 @@ const GROUND: f64 = 0.5;
 pub const PLANT_EYE: f64 = GROUND + 5.0 * layout::ROUTE_STOREY as f64 + 1.7;
 
 /// Lowest and highest level of detail.
-const LEVELS: [u32; 2] = [1, 80];
-/// Cells of pipe at [`PLANT_1M`], and how their number goes with the total.
-const PIPE_CELLS_1M: f64 = 5_000.0;
-const PIPE_POWER: f64 = 0.8;
+const LEVELS: [u32; 2] = [0, 80];
+/// Cells of pipe at [`PLANT_1M`], and how their number goes with the total below and above it: small totals go to the steel first.
+const PIPE_CELLS_1M: f64 = 7_000.0;
+const PIPE_POWERS: [f64; 2] = [1.2, 0.75];
 /// How the share of walkways and machines goes with the total.
 const SHARE_POWER: f64 = 0.45;
 
@@ -115,14 +115,15 @@ pub fn plant(settings: &PlantSettings) -> Result<PlantScene, GenerateError> {
 
 /// Pipes through what is free, each kind of piece with its places.
 fn pipes(asked: u64, space: &layout::Space, rng: &mut ChaCha8Rng) -> Vec<Placed> {
-    let cells = PIPE_CELLS_1M * (asked as f64 / PLANT_1M as f64).powf(PIPE_POWER);
+    let times = asked as f64 / PLANT_1M as f64;
+    let cells = PIPE_CELLS_1M * times.powf(PIPE_POWERS[usize::from(times > 1.0)]);
     let mut kinds: BTreeMap<Part, Vec<DAffine3>> = BTreeMap::new();
     for (part, at) in pipework(layout::CELLS, |c| space.taken(c), cells as usize, rng) {
         kinds.entry(part).or_default().push(at);
     }
     let placed = |(part, at): (Part, Vec<DAffine3>)| Placed {
         name: part.name(),
-        // A pipe of the lowest level has as many sides as one can have.
+        // Three sides more than other things have of levels: pipes are what one looks at.
         make: Box::new(move |level| part_mesh(part, 3 + level)),
         at,
     };

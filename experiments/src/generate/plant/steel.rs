@@ -131,6 +131,12 @@ pub(super) fn floor(s: &mut Solid, level: u32, edge: f32) {
 /// Cable trays along x, two over each other, with cables; hung from y = 0.
 pub(super) fn trays(s: &mut Solid, level: u32, long: f32) {
     let x = 0.5 * long;
+    if level < 2 {
+        for y in [-0.35, -0.7] {
+            bar(s, [-x, y, -0.25], [x, y + 0.09, 0.25], [110, 112, 114]);
+        }
+        return bar(s, [-0.02, -0.75, -0.02], [0.02, 0.0, 0.02], STEEL);
+    }
     for (i, y) in [-0.35, -0.7].into_iter().enumerate() {
         for z in [-0.25, 0.23] {
             bar(s, [-x, y, z], [x, y + 0.09, z + 0.02], [170, 174, 176]);
@@ -151,5 +157,19 @@ pub(super) fn trays(s: &mut Solid, level: u32, long: f32) {
             bar(s, [at, -0.75, z], [at + 0.03, 0.0, z + 0.03], STEEL);
         }
         bar(s, [at, -0.75, -0.27], [at + 0.03, -0.72, 0.25], STEEL);
+    }
+}
+
+/// A sheet of corrugated cladding, 10 m along x and 5 m high from y = 0, that looks along +z.
+pub(super) fn cladding(s: &mut Solid, level: u32) {
+    let paint: Paint = [158, 172, 180];
+    bar(s, [-5.0, 0.0, 0.0], [5.0, 4.98, 0.03], paint);
+    let ribs = 6 + 3 * level.min(14);
+    for k in 0..ribs {
+        let x = -5.0 + 10.0 * (k as f32 + 0.5) / ribs as f32;
+        let w = 2.2 / ribs as f32;
+        for [from, to] in [[-0.05, 0.0], [0.03, 0.09]] {
+            bar(s, [x - w, 0.0, from], [x + w, 4.98, to], paint);
+        }
     }
 }

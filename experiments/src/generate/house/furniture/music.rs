@@ -77,7 +77,7 @@ fn keys(m: &mut Model, n: u32) {
 }
 
 fn strings(m: &mut Model) {
-    let count = 10 + 4 * m.level().min(20);
+    let count = 2 + 4 * m.level().min(20);
     m.part(Stuff::Paint, |s| {
         for k in 0..count {
             let t = k as f32 / (count - 1) as f32;
@@ -122,11 +122,17 @@ fn bench(m: &mut Model) {
 fn vases(m: &mut Model) {
     let sides = 2 * m.sides();
     m.part(Stuff::Paint, |s| {
-        let tall = [[0.0, 0.0], [0.0, 0.06], [0.1, 0.09], [0.2, 0.08], [0.3, 0.03], [0.36, 0.045], [0.36, 0.038], [0.3, 0.0]];
+        let tall =
+            [[0.0, 0.0], [0.0, 0.06], [0.1, 0.09], [0.2, 0.08], [0.3, 0.03], [0.36, 0.045], [0.36, 0.038], [0.3, 0.0]];
         s.lathe(up(0.0, 0.0, 0.0), sides, [180, 96, 60], &tall);
         let low = [[0.0, 0.0], [0.0, 0.05], [0.06, 0.1], [0.12, 0.08], [0.13, 0.075], [0.06, 0.0]];
         s.lathe(up(0.24, 0.0, 0.03), sides, [208, 202, 186], &low);
-        s.lathe(up(-0.22, 0.0, 0.02), sides, STEEL, &[[0.0, 0.0], [0.0, 0.05], [0.01, 0.05], [0.03, 0.012], [0.2, 0.01], [0.2, 0.0]]);
+        s.lathe(
+            up(-0.22, 0.0, 0.02),
+            sides,
+            STEEL,
+            &[[0.0, 0.0], [0.0, 0.05], [0.01, 0.05], [0.03, 0.012], [0.2, 0.01], [0.2, 0.0]],
+        );
     });
 }
 
@@ -134,6 +140,11 @@ pub(super) fn furnish(out: &mut Vec<Thing>) {
     out.push(thing("grand piano", vec![put(13.45, 0.0, 8.85, 180.0)], piano));
     out.push(thing("piano bench", vec![put(13.45, 0.0, 7.85, 180.0)], bench));
     out.push(thing("music stand", vec![put(12.15, 0.0, 7.7, 120.0)], stand));
-    let on = [put(4.36, 0.811, 3.1, -90.0), put(7.48, 0.811, 2.15, 90.0), put(11.5, 0.811, 2.5, 90.0), put(10.75, 0.811, 4.64, 0.0)];
+    let on = [
+        put(4.36, 0.811, 3.1, -90.0),
+        put(7.48, 0.811, 2.15, 90.0),
+        put(11.5, 0.811, 2.5, 90.0),
+        put(10.75, 0.811, 4.64, 0.0),
+    ];
     out.push(thing("vases", on.to_vec(), vases));
 }

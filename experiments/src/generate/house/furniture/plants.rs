@@ -53,13 +53,15 @@ fn pot(m: &mut Model, r: f32, h: f32, paint: Paint) {
 fn palm(m: &mut Model) {
     pot(m, 0.19, 0.34, [184, 104, 72]);
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let (fronds, leaflets) = (9 + m.level(), 3 + m.level());
+    let (fronds, leaflets) = (if m.level() == 0 { 5 } else { 9 + m.level() }, 2 + m.level());
     m.part(Stuff::Carpet, |s| {
         for f in 0..fronds {
             let angle = 2.4 * f as f32 + rng.random_range(-0.2..0.2);
             let (sn, c) = angle.sin_cos();
             let (reach, rise) = (rng.random_range(0.3..0.62), rng.random_range(0.55..1.15));
-            let at = |t: f32| Vec3::new(c * reach * t * t.sqrt(), 0.3 + rise * (t - 0.42 * t * t) * 1.5, sn * reach * t * t.sqrt());
+            let at = |t: f32| {
+                Vec3::new(c * reach * t * t.sqrt(), 0.3 + rise * (t - 0.42 * t * t) * 1.5, sn * reach * t * t.sqrt())
+            };
             let stem: Vec<Vec3> = (0..=6).map(|i| at(i as f32 / 6.0)).collect();
             s.sweep(&stem, 4, [110, 138, 60], |t| 0.007 * (1.0 - 0.8 * t));
             for k in 0..leaflets {
@@ -80,12 +82,14 @@ fn palm(m: &mut Model) {
 fn rubber(m: &mut Model, scale: f32) {
     pot(m, 0.16 * scale, 0.26 * scale, [228, 226, 218]);
     let mut rng = ChaCha8Rng::seed_from_u64(8);
-    let leaves = 14 + 6 * m.level();
+    let leaves = 6 + 7 * m.level();
     m.part(Stuff::Carpet, |s| {
         for stem in 0..3 {
             let (sn, c) = (2.1 * stem as f32).sin_cos();
             let top = Vec3::new(0.12 * c, 0.85 + 0.15 * stem as f32, 0.12 * sn) * scale;
-            s.sweep(&[Vec3::new(0.0, 0.2 * scale, 0.0), top * Vec3::new(0.6, 0.6, 0.6), top], 5, [112, 92, 62], |_| 0.011 * scale);
+            s.sweep(&[Vec3::new(0.0, 0.2 * scale, 0.0), top * Vec3::new(0.6, 0.6, 0.6), top], 5, [112, 92, 62], |_| {
+                0.011 * scale
+            });
         }
         for _ in 0..leaves {
             let (sn, c) = rng.random_range(0.0..std::f32::consts::TAU).sin_cos();
@@ -131,7 +135,8 @@ pub(in crate::generate::house) fn crown(m: &mut Model, high: f32, paint: Paint, 
     let fork = Vec3::new(rng.random_range(-0.2..0.2), 0.4 * high, rng.random_range(-0.2..0.2));
     let bark = [118, 96, 76];
     let mut ends = vec![];
-    for k in 0..7 {
+    let branches = if m.level() == 0 { 4 } else { 7 };
+    for k in 0..branches {
         let angle = 2.4 * k as f32 + rng.random_range(-0.4..0.4);
         let out = if k == 0 { 0.0 } else { rng.random_range(0.14..0.27) * high };
         let y = if k == 0 { 0.84 } else { rng.random_range(0.58..0.78) } * high;
@@ -160,13 +165,14 @@ pub(in crate::generate::house) fn bush(m: &mut Model, paint: Paint, flowers: Opt
         let r = rng.random_range(0.34..0.46);
         foliage(m, Vec3::new(x, 0.8 * r, rng.random_range(-0.15..0.15)), Vec3::new(r, 0.95 * r, r), paint, &mut rng);
     }
-    let Some(color) = flowers else { return };
+    let Some(color) = flowers.filter(|_| m.level() > 0) else { return };
     let (count, n) = (8 + 3 * m.level(), 2 + m.level() / 6);
     m.part(Stuff::Paint, |s| {
         for _ in 0..count {
             let (sn, c) = rng.random_range(0.0..std::f32::consts::TAU).sin_cos();
             let (r, t) = (rng.random_range(0.3..0.44), rng.random_range(0.2..1.2_f32));
-            let p = Vec3::new(0.3 * rng.random_range(-1.0..1.0) + r * c * t.sin(), 0.36 + r * t.cos(), r * sn * t.sin());
+            let p =
+                Vec3::new(0.3 * rng.random_range(-1.0..1.0) + r * c * t.sin(), 0.36 + r * t.cos(), r * sn * t.sin());
             s.ball(Affine3A::from_translation(p), n, color, |_| 0.035);
         }
     });
@@ -175,11 +181,12 @@ pub(in crate::generate::house) fn bush(m: &mut Model, paint: Paint, flowers: Opt
 /// A clipped hedge along x, `long` long.
 pub(in crate::generate::house) fn hedge(m: &mut Model, long: f32, high: f32, seed: u64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let (n, leaves) = (1 + m.level() / 2, (long * 2.0) as u32 * m.level() * m.level());
+    let level = m.level();
+    let (n, leaves) = (level.div_ceil(2), (long * 2.0) as u32 * level.pow(2).min(level * 12));
     let paint = [66, 104, 48];
     m.part(Stuff::Carpet, |s| {
-        // Pieces of a metre, so that there is room for bumps.
-        let pieces = long.round() as u32;
+        // Pieces of a metre, so that there is room for bumps; longer on low levels.
+        let pieces = if n < 2 { 2 } else { long.round() as u32 };
         for k in 0..pieces {
             let first = s.mesh.positions.len();
             let x = (k as f32 + 0.5) * long / pieces as f32 - 0.5 * long;
@@ -211,10 +218,27 @@ pub(in crate::generate::house) fn hedge(m: &mut Model, long: f32, high: f32, see
 }
 
 pub(super) fn furnish(out: &mut Vec<Thing>) {
-    let palms = vec![put(7.9, 0.0, 10.4, 0.0), put(0.6, 0.0, 10.4, 90.0), put(14.4, 0.0, 10.45, 200.0), put(14.5, 0.0, 0.5, 40.0)];
+    let palms = vec![
+        put(7.9, 0.0, 10.4, 0.0),
+        put(0.6, 0.0, 10.4, 90.0),
+        put(14.4, 0.0, 10.45, 200.0),
+        put(14.5, 0.0, 0.5, 40.0),
+    ];
     out.push(thing("palm", palms, palm));
-    let pots = vec![put(5.55, 0.0, 6.95, 0.0), put(7.55, 0.0, 4.0, 50.0), put(4.25, 0.0, 5.7, 80.0), put(11.3, 0.0, 10.5, 0.0)];
+    let pots = vec![
+        put(5.55, 0.0, 6.95, 0.0),
+        put(7.55, 0.0, 4.0, 50.0),
+        put(4.25, 0.0, 5.7, 80.0),
+        put(11.3, 0.0, 10.5, 0.0),
+    ];
     out.push(thing("rubber plant", pots, |m| rubber(m, 1.0)));
-    let small = [(0.28, 1.08 - 0.17, 4.0), (1.9, 1.09, 0.14), (8.8, 0.905, 0.14), (12.8, 0.905, 0.14), (9.8, 0.905, 10.84), (8.0, 0.44, 7.95)];
+    let small = [
+        (0.28, 1.08 - 0.17, 4.0),
+        (1.9, 1.09, 0.14),
+        (8.8, 0.905, 0.14),
+        (12.8, 0.905, 0.14),
+        (9.8, 0.905, 10.84),
+        (8.0, 0.44, 7.95),
+    ];
     out.push(thing("small plant", small.map(|(x, y, z)| put(x, y, z, 60.0 * x)).to_vec(), |m| rubber(m, 0.32)));
 }
