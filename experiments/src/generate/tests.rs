@@ -346,7 +346,7 @@ pub(crate) fn walked(
     let path = crate::path::cameras(&experiment.view, &views, &scene, loaded.route.as_ref()).unwrap();
     let eye = path[0].eye.y as f32;
     let (mut corners, mut owners) = (vec![], vec![]);
-    for chunk in scene.chunks.iter().filter(|c| c.bounds.min.y < eye + 1.0 && c.bounds.max.y > eye - 1.0) {
+    for chunk in scene.chunks.iter().filter(|c| c.bounds.min.y < eye + 6.0 && c.bounds.max.y > eye - 6.0) {
         let at = &scene.objects[chunk.object.index()];
         let own = |mesh: &farfield_core::mesh::ChunkMesh| {
             let place = |i: &u32| at.placement.transform_point3(mesh.positions[*i as usize].as_dvec3()).as_vec3();
@@ -360,7 +360,7 @@ pub(crate) fn walked(
     }
     let indices: Vec<u32> = (0..corners.len() as u32).collect();
     let bvh = farfield_core::bvh::TriangleBvh::build(&corners, &indices);
-    let nearest = path.iter().filter_map(|c| bvh.closest_point(c.eye.as_vec3(), 1.0).map(|n| (n, c.eye)));
-    let (n, at) = nearest.min_by(|a, b| a.0.distance.total_cmp(&b.0.distance)).expect("walls are within a metre");
+    let nearest = path.iter().filter_map(|c| bvh.closest_point(c.eye.as_vec3(), 6.0).map(|n| (n, c.eye)));
+    let (n, at) = nearest.min_by(|a, b| a.0.distance.total_cmp(&b.0.distance)).expect("something is within 6 units");
     (path, scene.origin, (n.distance, scene.meshes[owners[n.triangle as usize]].name.clone(), at))
 }

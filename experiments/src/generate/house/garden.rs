@@ -9,8 +9,8 @@ use super::stuff::{Model, Stuff, Thing, thing};
 use crate::generate::noise::fbm;
 use crate::generate::solid::{Paint, Solid};
 
-/// The lawn's lower side: the scene's lowest point.
-pub(super) const BOTTOM: f32 = -0.4;
+/// The lawn's lower side: the scene's lowest point, below every leaf of the bushes.
+pub(super) const BOTTOM: f32 = -0.8;
 /// How far the garden reaches beyond the house.
 const REACH: f32 = 11.0;
 

@@ -216,7 +216,8 @@ fn room(room: Room, out: &mut Vec<Thing>) {
                 for (x, n) in [(a.x, Vec3::NEG_X), (b.x, Vec3::X)] {
                     patch(s, &zs, &[low, high], n, paint, |z, y| Vec3::new(x, y, z));
                 }
-                patch(s, &xs, &zs, -normal, paint, |x, z| Vec3::new(x, low + high - y, z));
+                let other = if up { low } else { high };
+                patch(s, &xs, &zs, -normal, paint, |x, z| Vec3::new(x, other, z));
             });
         })
     };
@@ -342,7 +343,7 @@ fn roof(m: &mut Model) {
     m.part(Stuff::Roof, |s| {
         for (side, from) in [(-1.0, z[0]), (1.0, z[1])] {
             patch(s, &along, &slope, n(side), [255; 3], |a, t| {
-                Vec3::new(a, rim + (ridge - rim) * t, from + (middle - from) * t)
+                Vec3::new(a, rim * (1.0 - t) + ridge * t, from * (1.0 - t) + middle * t)
             });
         }
     });
@@ -357,8 +358,8 @@ fn roof(m: &mut Model) {
             patch(s, &[z[0], z[1]], &[low, rim], normal, board, |b, y| Vec3::new(at, y, b));
             // The gable: the slopes' points from one eave over the ridge to the other, in pairs of equal height.
             for w in slope.windows(2) {
-                let y = |t: f32| rim + (ridge - rim) * t;
-                let across = |t: f32| [z[0], z[1]].map(|f| f + (middle - f) * t);
+                let y = |t: f32| rim * (1.0 - t) + ridge * t;
+                let across = |t: f32| [z[0], z[1]].map(|f| f * (1.0 - t) + middle * t);
                 let corners = [across(w[0])[0], across(w[0])[1], across(w[1])[1], across(w[1])[0]];
                 let ids = [0, 1, 2, 3].map(|k| {
                     let p = Vec3::new(at, y(w[usize::from(k > 1)]), corners[k]);

@@ -24,7 +24,7 @@ const STEEL: Paint = [112, 124, 136];
 pub(super) fn panel(s: &mut Solid, level: u32) {
     let (w, n) = (0.5 * PANEL, 3 + level.min(18));
     bar(s, [-w, 0.0, -0.06], [w, STOREY, 0.0], [104, 84, 74]);
-    let count = 8 + 2 * level.min(16);
+    let count = 5 + 2 * level.min(18);
     let pitch = PANEL / count as f32;
     for k in 0..count {
         let x = -w + pitch * (k as f32 + 0.5);
@@ -40,7 +40,7 @@ pub(super) fn buckstay(s: &mut Solid, level: u32) {
     bar(s, [-x, -0.25, 0.12], [x, -0.22, 0.5], STEEL);
     bar(s, [-x, 0.22, 0.12], [x, 0.25, 0.5], STEEL);
     bar(s, [-x, -0.22, 0.29], [x, 0.22, 0.32], STEEL);
-    let ribs = 4 + 2 * level.min(8);
+    let ribs = 2 * level.min(10);
     for k in 0..ribs {
         let at = -x + 2.0 * x * (k as f32 + 0.5) / ribs as f32;
         bar(s, [at, -0.22, 0.12], [at + 0.03, 0.22, 0.29], STEEL);
@@ -52,7 +52,7 @@ pub(super) fn buckstay(s: &mut Solid, level: u32) {
 pub(super) fn header(s: &mut Solid, level: u32) {
     let at = frame(Vec3::ZERO, Vec3::X, Vec3::Y);
     s.lathe(at, 2 * sides(level), [168, 170, 172], &shell(-HALF - 0.6, HALF + 0.6, 0.32, level));
-    let count = 10 + 5 * level.min(14);
+    let count = 5 * level.min(16);
     for k in 0..count {
         let x = -HALF + 2.0 * HALF * (k as f32 + 0.5) / count as f32;
         let z = if k % 2 == 0 { 0.14 } else { -0.14 };

@@ -326,7 +326,7 @@ fn bays(out: &mut Vec<Placed>, space: &mut Space, share: f64, rng: &mut ChaCha8R
                 let (kind, quarters) = (rng.random_range(0..11), rng.random_range(0..4));
                 // Near the boiler and on the route's storey machines are denser.
                 let near = (x - BOILER.x).abs().max((z - BOILER.z).abs()) < 20.0 && (storey - ROUTE_STOREY).abs() < 3;
-                let keep = if near { share.sqrt() } else { share };
+                let keep = if near { share.powf(0.6) } else { share };
                 if !rng.random_bool(keep) || kind >= kinds.len() || !space.free(low, high) {
                     continue;
                 }

@@ -53,9 +53,9 @@ pub const PLANT_EYE: f64 = GROUND + 5.0 * layout::ROUTE_STOREY as f64 + 1.7;
 const LEVELS: [u32; 2] = [0, 80];
 /// Cells of pipe at [`PLANT_1M`], and how their number goes with the total below and above it: small totals go to the steel first.
 const PIPE_CELLS_1M: f64 = 7_000.0;
-const PIPE_POWERS: [f64; 2] = [1.2, 0.75];
+const PIPE_POWERS: [f64; 2] = [1.4, 0.75];
 /// How the share of walkways and machines goes with the total.
-const SHARE_POWER: f64 = 0.45;
+const SHARE_POWER: f64 = 0.5;
 
 /// What plant to make.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -164,7 +164,7 @@ pub(super) fn trays(s: &mut Solid, level: u32, long: f32) {
 pub(super) fn cladding(s: &mut Solid, level: u32) {
     let paint: Paint = [158, 172, 180];
     bar(s, [-5.0, 0.0, 0.0], [5.0, 4.98, 0.03], paint);
-    let ribs = 6 + 3 * level.min(14);
+    let ribs = 3 * level.min(16);
     for k in 0..ribs {
         let x = -5.0 + 10.0 * (k as f32 + 0.5) / ribs as f32;
         let w = 2.2 / ribs as f32;
