@@ -147,7 +147,9 @@ fn cube(
 ) -> Result<(Payload, Vec<Piece>, u64), Fault> {
     let eye = p.eye();
     if mesh.indices.is_empty() {
-        return Ok((Payload { origin: eye, bounds: Aabb::EMPTY, parts: vec![] }, vec![], 0));
+        // All that it sees an ancestor has.
+        let bounds = Aabb::of([eye.as_vec3()]);
+        return Ok((Payload { origin: eye, bounds, parts: vec![] }, vec![], 0));
     }
     let cameras: Vec<Camera> = p.views().iter().map(|v| v.0).collect();
     let patches = patches(&cameras, mesh);
