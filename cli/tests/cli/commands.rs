@@ -214,7 +214,13 @@ fn a_house_keeps_its_textures_in_a_file_and_the_examples_walk_their_routes() {
         let example = format!("{}/../examples/{name}.toml", env!("CARGO_MANIFEST_DIR"));
         let small = [
             "all geometry.backend=cpu",
-            "frustum culled.backend=cpu",
+            "levels of detail.backend=cpu",
+            "levels of detail.far_field.max_px=8.0",
+            "plain depth meshes.backend=cpu",
+            "plain depth meshes.far_field.face_px=32",
+            "incremental depth meshes.backend=cpu",
+            "incremental depth meshes.far_field.face_px=32",
+            "incremental depth meshes.far_field.sampling_px=16",
             "scene.triangles=100000",
             "view.resolution=64",
             "view.frames=3",
@@ -224,7 +230,7 @@ fn a_house_keeps_its_textures_in_a_file_and_the_examples_walk_their_routes() {
         let mut args = vec!["run", &example, "--out", name];
         small.iter().for_each(|s| args.extend(["--set", s]));
         let said = f.ok(&args);
-        assert!(said.contains("frustum culled"), "{said}");
+        assert!(said.contains("incremental depth meshes"), "{said}");
         assert!(f.path(&format!("{name}/report.html")).is_file());
     }
 }
