@@ -8,7 +8,7 @@ use farfield_experiments::config::BackendName;
 use farfield_experiments::measure::Rendered;
 use farfield_experiments::walk::{self, Device, Opened};
 use farfield_far_itdm::Index;
-use farfield_integration_tests::lab::{Lab, errors};
+use farfield_integration_tests::lab::{Frame, Lab, errors};
 use glam::DVec3;
 
 /// Faces of the samples.
@@ -20,7 +20,7 @@ fn experiment(light: [f32; 3], incremental: &str) -> String {
         r#"
         [scene]
         source = "house"
-        triangles = 30_000
+        triangles = 45_000
         [view]
         resolution = [96, 96]
         near = 0.05
@@ -73,8 +73,12 @@ fn shown(lab: &Lab, opened: &Opened<'_>, cell: CellId, camera: &Camera, device: 
     walk::read(&mut *device.backend).unwrap()
 }
 
-/// Pixels of a cube around `eye` that show a far surface and, by the far field, nothing or something farther away by more than 2 %; and
-/// all pixels that show a far surface.
+/// Nearer than this share of the distance from the eye is the same surface: a point counts as one that an ancestor has up to two pixels off, and
+/// a pixel spans 2 / PX.
+const SAME: f32 = 1.02 * 2.0 * 2.0 / PX as f32;
+
+/// Pixels of a cube around `eye` that show a far surface and, by the far field, nothing or another surface behind it; and all pixels that
+/// show a far surface.
 fn cracks(lab: &Lab, opened: &Opened<'_>, cell: CellId, eye: DVec3, device: &mut Device) -> (usize, usize) {
     let mut out = (0, 0);
     for camera in Camera::cube(eye, PX, lab.prepared.views.near) {
@@ -82,7 +86,8 @@ fn cracks(lab: &Lab, opened: &Opened<'_>, cell: CellId, eye: DVec3, device: &mut
         let found = shown(lab, opened, cell, &camera, device, false).surface;
         for i in (0..truth.depth.len()).filter(|&i| truth.hit(i)) {
             out.1 += 1;
-            out.0 += usize::from(!found.hit(i) || found.depth[i] > 1.02 * truth.depth[i]);
+            let ray = camera.ray((i as u32 % PX) as f32 + 0.5, (i as u32 / PX) as f32 + 0.5);
+            out.0 += usize::from(!found.hit(i) || found.depth[i] > (1.0 + SAME * ray.length()) * truth.depth[i]);
         }
     }
     out
@@ -90,7 +95,8 @@ fn cracks(lab: &Lab, opened: &Opened<'_>, cell: CellId, eye: DVec3, device: &mut
 
 #[test]
 fn where_samples_were_taken_there_is_not_one_crack_before_simplification_and_few_after_it() {
-    let dense = lab("border_px = 0.0, interior_px = 0.0, tree_triangles = 100_000_000");
+    // Steps of more than SAME are skins at 30 degrees: a surface that reaches over one would not be a crack, but not the truth either.
+    let dense = lab("border_px = 0.0, interior_px = 0.0, tree_triangles = 100_000_000, alpha_deg = 30.0");
     let opened = dense.opened(1).unwrap();
     let mut device = dense.device(BackendName::Cpu).unwrap();
     let cell = opened.cell_of(&dense.prepared.cameras[0]).unwrap();
@@ -127,10 +133,14 @@ fn there_are_no_skins_where_plain_depth_meshes_have_them() {
     let mut of = |pipeline: usize| -> (f64, f64) {
         let tested = lab.frames(pipeline, &frames, &mut device).unwrap();
         let all: Vec<_> = reference.iter().zip(&tested).map(|(r, t)| errors(r, t)).collect();
-        // A skin stands before what it hides: nearer than the reference by more than 5 %.
-        let skin = |(r, t): (&farfield_integration_tests::lab::Frame, &farfield_integration_tests::lab::Frame)| {
+        // A skin stands before what it hides: nearer than all that the reference shows within two pixels, so that outlines which
+        // moved by one do not count.
+        let skin = |(r, t): (&Frame, &Frame)| {
             let (r, t) = (&r.rendered.surface, &t.rendered.surface);
-            (0..r.depth.len()).filter(|&i| t.hit(i) && t.depth[i] < 0.95 * r.depth[i]).count()
+            let near = |c: u32| c.saturating_sub(2)..(c + 3).min(96);
+            let around = |i: u32| near(i / 96).flat_map(move |y| near(i % 96).map(move |x| (y * 96 + x) as usize));
+            let least = |i: u32| around(i).map(|j| r.depth[j]).fold(f32::INFINITY, f32::min);
+            (0..96 * 96).filter(|&i| t.hit(i as usize) && t.depth[i as usize] < 0.95 * least(i)).count()
         };
         let skins: usize = reference.iter().zip(&tested).map(skin).sum();
         let psnr = all.iter().map(|e| e.luminance.psnr_db()).fold(f64::INFINITY, f64::min);
@@ -138,7 +148,7 @@ fn there_are_no_skins_where_plain_depth_meshes_have_them() {
     };
     let (incremental, plain) = (of(1), of(2));
     println!("incremental {incremental:?}, plain {plain:?} (PSNR dB, skin pixels)");
-    assert!(incremental.1 < 0.02 && incremental.1 * 2.0 < plain.1, "{incremental:?} {plain:?}");
+    assert!(incremental.1 < 0.01 && incremental.1 * 10.0 < plain.1, "{incremental:?} {plain:?}");
     assert!(incremental.0 > plain.0, "{incremental:?} {plain:?}");
 }
 

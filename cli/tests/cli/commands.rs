@@ -204,6 +204,32 @@ fn the_example_park_runs() {
 }
 
 #[test]
+fn a_house_keeps_its_textures_in_a_file_and_the_examples_walk_their_routes() {
+    let f = Folder::new();
+    let said = f.ok(&["scene", "house", "--triangles", "60000", "--out", "house.glb"]);
+    assert!(said.contains("objects"), "{said}");
+    assert!(std::fs::metadata(f.path("house.glb")).unwrap().len() > 3_000_000, "textures are in it");
+    assert_eq!(f.fails(&["scene", "plant", "--triangles", "99999", "--out", "x.glb"]).0, 2);
+    for name in ["house", "plant"] {
+        let example = format!("{}/../examples/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let small = [
+            "all geometry.backend=cpu",
+            "frustum culled.backend=cpu",
+            "scene.triangles=100000",
+            "view.resolution=64",
+            "view.frames=3",
+            "measure.every=1",
+            "measure.audit_views=4",
+        ];
+        let mut args = vec!["run", &example, "--out", name];
+        small.iter().for_each(|s| args.extend(["--set", s]));
+        let said = f.ok(&args);
+        assert!(said.contains("frustum culled"), "{said}");
+        assert!(f.path(&format!("{name}/report.html")).is_file());
+    }
+}
+
+#[test]
 fn the_example_pipes_run() {
     let f = Folder::new();
     let pipes = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/pipes.toml");

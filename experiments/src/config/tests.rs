@@ -164,6 +164,20 @@ fn pipes_bring_their_own_size_and_eye_height() {
 }
 
 #[test]
+fn a_house_and_a_plant_bring_an_eye_height_and_a_route_and_others_do_not() {
+    for (kind, eye, triangles) in
+        [("house", crate::generate::HOUSE_EYE, 262_879), ("plant", crate::generate::PLANT_EYE, 1_000_000)]
+    {
+        let text = GOOD.replace("source = \"park\"\ntriangles = 200_000", &format!("source = \"{kind}\""));
+        let e = read(&text, &["view.path=route"]).unwrap();
+        assert_eq!(e.resolved["scene"]["triangles"], serde_json::json!(triangles));
+        assert_eq!((e.view.eye_height, e.view.path.as_str()), (Some([eye as f32; 2]), "route"));
+    }
+    let park = told(GOOD, &["view.path=route"]);
+    assert!(park.len() == 1 && park[0].contains("the scene brings no route along"), "{park:?}");
+}
+
+#[test]
 fn the_reference_is_not_built_on_demand() {
     let text = "[scene]\nsource = \"park\"\n[[pipeline]]\nname = \"a\"\nbuild = \"on-demand\"\nfar_field = { type = \"geometry\" }\n\
                 [[pipeline]]\nname = \"b\"\nfar_field = { type = \"geometry\" }\n";

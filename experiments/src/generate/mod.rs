@@ -3,7 +3,7 @@
 //! [`park`] is a statuary park after the one that system T was measured on: eight kinds of procedurally sculpted statues with
 //! that scene's triangle counts, sizes, numbers and area, at any total from 100,000 to 64 million triangles; or the same
 //! park from mesh files, fitted to the same boxes ([`fit`]). [`pipes`] is a box full of pipework, from 10,000 to 16 million.
-//! [`house`] is a furnished and textured house in its garden, from 20,000 to 4 million; [`plant`] a power plant, from 100,000 to 12.5 million; both
+//! [`house`] is a furnished and textured house in its garden, from 45,000 to 4 million; [`plant`] a power plant, from 100,000 to 12.5 million; both
 //! bring a route along.
 //! Everything here is a pure function of its settings: the same settings give the same bytes, whatever the number of threads.
 

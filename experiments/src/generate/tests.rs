@@ -332,3 +332,35 @@ fn the_table_of_real_models_agrees_with_their_manifest() {
         assert!(reach(got) < 1.25 * reach(kind.size()), "{}: {got} does not fit its place", kind.name());
     }
 }
+
+/// The cameras of an example's path with settings, the scene's origin, and of all eyes the one that is nearest to a triangle: how near,
+/// whose, and where, local frame.
+pub(crate) fn walked(
+    file: &std::path::Path,
+    sets: &[String],
+) -> (Vec<farfield_core::Camera>, glam::DVec3, (f32, String, glam::DVec3)) {
+    let experiment = crate::config::load(file, sets, &crate::list::entries()).unwrap();
+    let loaded = crate::scene::scene(&experiment).unwrap();
+    let scene = loaded.scene;
+    let views = crate::path::views(&experiment.view, &scene);
+    let path = crate::path::cameras(&experiment.view, &views, &scene, loaded.route.as_ref()).unwrap();
+    let eye = path[0].eye.y as f32;
+    let (mut corners, mut owners) = (vec![], vec![]);
+    for chunk in scene.chunks.iter().filter(|c| c.bounds.min.y < eye + 6.0 && c.bounds.max.y > eye - 6.0) {
+        let at = &scene.objects[chunk.object.index()];
+        let own = |mesh: &farfield_core::mesh::ChunkMesh| {
+            let place = |i: &u32| at.placement.transform_point3(mesh.positions[*i as usize].as_dvec3()).as_vec3();
+            for t in mesh.indices.chunks_exact(3) {
+                corners.extend(t.iter().map(place));
+                owners.push(at.mesh.index());
+            }
+        };
+        let mut own = own;
+        scene.geometry.with(chunk.source, &mut own).unwrap();
+    }
+    let indices: Vec<u32> = (0..corners.len() as u32).collect();
+    let bvh = farfield_core::bvh::TriangleBvh::build(&corners, &indices);
+    let nearest = path.iter().filter_map(|c| bvh.closest_point(c.eye.as_vec3(), 6.0).map(|n| (n, c.eye)));
+    let (n, at) = nearest.min_by(|a, b| a.0.distance.total_cmp(&b.0.distance)).expect("something is within 6 units");
+    (path, scene.origin, (n.distance, scene.meshes[owners[n.triangle as usize]].name.clone(), at))
+}

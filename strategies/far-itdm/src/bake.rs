@@ -147,8 +147,9 @@ fn cube(
 ) -> Result<(Payload, Vec<Piece>, u64), Fault> {
     let eye = p.eye();
     if mesh.indices.is_empty() {
-        // The eye stands for a box of nothing: the index, JSON, has no word for infinite corners.
-        return Ok((Payload { origin: eye, bounds: Aabb::of([eye.as_vec3()]), parts: vec![] }, vec![], 0));
+        // All that it sees an ancestor has, or it sees nothing. The index, JSON, has no word for an empty box.
+        let bounds = Aabb::of([eye.as_vec3()]);
+        return Ok((Payload { origin: eye, bounds, parts: vec![] }, vec![], 0));
     }
     let cameras: Vec<Camera> = p.views().iter().map(|v| v.0).collect();
     let patches = patches(&cameras, mesh);

@@ -19,6 +19,12 @@ pub(crate) struct Dense {
     pub(crate) views_of: Vec<u8>,
 }
 
+/// The two triangles of a pixel's corners (top left, top right, bottom right, bottom left), along its shorter diagonal,
+/// counter-clockwise seen from the eye.
+pub(crate) fn split([tl, tr, br, bl]: [Vec3; 4]) -> [[usize; 3]; 2] {
+    if tl.distance_squared(br) <= tr.distance_squared(bl) { [[0, 3, 2], [0, 2, 1]] } else { [[1, 0, 3], [1, 3, 2]] }
+}
+
 impl Dense {
     /// The mesh of the pixels that `keep` says.
     pub(crate) fn new(p: &Panorama<'_>, surface: &Surface, keep: &[bool]) -> Self {
@@ -30,15 +36,9 @@ impl Dense {
                 if !keep[pixel as usize] || quad[0] == NONE {
                     continue;
                 }
-                let [tl, tr, br, bl] = quad.map(|v| out.vertex(&mut own, surface, v, view as u8));
-                let at = |v: u32| out.positions[v as usize];
-                // Along the shorter diagonal.
-                let two = if at(tl).distance_squared(at(br)) <= at(tr).distance_squared(at(bl)) {
-                    [tl, bl, br, tl, br, tr]
-                } else {
-                    [tr, tl, bl, tr, bl, br]
-                };
-                out.indices.extend(two);
+                let own = quad.map(|v| out.vertex(&mut own, surface, v, view as u8));
+                let two = split(own.map(|v| out.positions[v as usize]));
+                out.indices.extend(two.into_iter().flatten().map(|k| own[k]));
                 out.views.extend([view as u8; 2]);
             }
         }

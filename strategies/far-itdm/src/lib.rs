@@ -52,7 +52,7 @@ use simplify::Limits;
 const INCREMENTAL: &str = "incremental-tdm";
 const PLAIN: &str = "textured-depth-mesh";
 
-/// 2: cubes of nothing have boxes that can be read back.
+/// 2: cubes of nothing have boxes that can be read back; what turns away mends nothing.
 const VERSION: u32 = 2;
 
 /// Incremental textured depth meshes.

@@ -19,6 +19,8 @@ use farfield_core::Camera;
 use farfield_core::panorama::raster::DepthCube;
 use farfield_core::panorama::{Panorama, Place, Surface};
 
+use crate::dense::split;
+
 /// For each pixel whether it shows a surface that no ancestor has.
 pub(crate) fn kept(own: &Panorama<'_>, ancestors: &[&Panorama<'_>], same_px: f32) -> Vec<bool> {
     let delta = pixel_tan(own);
@@ -59,8 +61,13 @@ pub(crate) fn mend(own: &Panorama<'_>, keep: &mut [bool], ancestors: &[Sample<'_
     for a in ancestors {
         let moved = (a.panorama.eye() - own.eye()).as_vec3();
         for pixel in (0..a.panorama.pixels()).filter(|&p| a.keep[p as usize]) {
-            if let Some(quad) = a.surface.quad(pixel) {
-                seen.draw_quad(quad.map(|p| p + moved));
+            let Some(quad) = a.surface.quad(pixel).map(|q| q.map(|p| p + moved)) else { continue };
+            for t in split(quad) {
+                let [a, b, c] = t.map(|k| quad[k]);
+                // What turns away from the eye is not drawn.
+                if (b - a).cross(c - a).dot(a) < 0.0 {
+                    seen.draw_triangle([a, b, c]);
+                }
             }
         }
     }

@@ -9,8 +9,8 @@ use super::stuff::{Model, Stuff, Thing, thing};
 use crate::generate::noise::fbm;
 use crate::generate::solid::{Paint, Solid};
 
-/// The lawn's lower side: the scene's lowest point.
-pub(super) const BOTTOM: f32 = -0.4;
+/// The lawn's lower side: the scene's lowest point, below every leaf of the bushes.
+pub(super) const BOTTOM: f32 = -0.8;
 /// How far the garden reaches beyond the house.
 const REACH: f32 = 11.0;
 
@@ -88,9 +88,10 @@ fn paving(s: &mut Solid, low: Vec2, high: Vec2, edge: f32, n: u32) {
 /// A piece of picket fence along x, 2 m long.
 fn fence(m: &mut Model) {
     let n = m.edge().min(2);
+    let pickets = if m.level() == 0 { 0 } else { 14 };
     m.part(Stuff::Wood, |s| {
         let white = [238, 234, 224];
-        for k in 0..14 {
+        for k in 0..pickets {
             let x = -0.93 + 0.143 * k as f32;
             let outline =
                 [(0.035, 0.012), (0.035, -0.012), (-0.035, -0.012), (-0.035, 0.012)].map(|(x, z)| Vec2::new(x, z));
@@ -118,7 +119,7 @@ fn parasol(m: &mut Model) {
 
 /// Long grass and clover in tufts.
 fn tuft(m: &mut Model) {
-    let blades = 4 + 2 * m.level();
+    let blades = 1 + 2 * m.level();
     m.part(Stuff::Carpet, |s| {
         for k in 0..blades {
             let u = |j: i32| crate::generate::noise::unit(k as i32, j, 31);
@@ -167,7 +168,7 @@ pub(super) fn garden() -> Vec<Thing> {
     out.push(thing("hedge", hedges, |m| hedge(m, 6.4, 1.7, 5)));
     let fences = (0..16).map(|k| -r + 1.0 + 2.0 * f64::from(k)).filter(|z| (z - 5.0).abs() > 1.2);
     out.push(thing("fence", fences.map(|z| on_ground(w + r - 0.4, z, 90.0)).collect(), fence));
-    let greens: [Paint; 3] = [[84, 124, 52], [104, 138, 62], [66, 110, 58]];
+    let greens: [Paint; 3] = [[104, 148, 66], [128, 160, 78], [88, 138, 74]];
     let trees: [&[(f64, f64, f64)]; 3] = [
         &[(-6.5, 3.0, 0.0), (10.6, -6.4, 100.0), (19.6, -4.0, 30.0)],
         &[(-5.6, 14.5, 60.0), (3.0, -6.8, 210.0), (21.5, 13.0, 0.0)],

@@ -83,7 +83,7 @@ fn light(room: Room, windows: &[(Vec3, f32)], p: Vec3, n: Vec3) -> f32 {
             0.55 * area * (d.dot(n) / d.length().max(0.2)).max(0.0) / (d.length_squared() + 0.7)
         })
         .sum();
-    ((0.74 + sky.min(0.26)) * (1.0 - dark.min(0.5))).min(1.0)
+    ((0.85 + sky.min(0.15)) * (1.0 - dark.min(0.5))).min(1.0)
 }
 
 /// The middles and areas of the openings to the outside of a room.
@@ -129,6 +129,8 @@ fn wall_faces(s: &mut Solid, wall: &Wall, heights: &[f32], step: f32, room: Opti
         |u: f32, v: f32| wall.openings.iter().any(|o| o.span[0] < u && u < o.span[1] && o.rise[0] < v && v < o.rise[1]);
     // The floor of a door's opening is the room's; walls run on below it.
     let seen = |p: Vec3| Room::at(Vec2::new(p.x, p.z)) == room;
+    // Reveals of outside walls belong to the room.
+    let inner = if wall.line == 0.0 { 0.02 * half } else { -0.02 * half };
     let (axis, across) = if wall.along_x { (Vec3::X, Vec3::Z) } else { (Vec3::Z, Vec3::X) };
     for u in along.windows(2) {
         for v in heights.windows(2) {
@@ -145,13 +147,13 @@ fn wall_faces(s: &mut Solid, wall: &Wall, heights: &[f32], step: f32, room: Opti
             let offs = [-half, half];
             for (at, to, normal) in [(u[0], mu - (u[1] - u[0]), -axis), (u[1], mu + (u[1] - u[0]), axis)] {
                 let open = hole(at + (to - at).signum() * 1e-3, mv) || at == wall.span[0] || at == wall.span[1];
-                if open && seen(wall.point(at, mv, 0.02 * half) + normal * 0.01) {
+                if open && seen(wall.point(at, mv, inner) + normal * 0.01) {
                     patch(s, &offs, v, normal, paint, |o, b| wall.point(at, b, o));
                 }
             }
             for (at, normal) in [(v[0], Vec3::NEG_Y), (v[1], Vec3::Y)] {
                 let open = hole(mu, at + normal.y * 1e-3) || at == FOOT || at == TOP;
-                if open && seen(wall.point(mu, at, 0.02 * half)) {
+                if open && seen(wall.point(mu, at, inner)) {
                     patch(s, u, &offs, normal, paint, |a, o| wall.point(a, at, o));
                 }
             }
@@ -214,7 +216,8 @@ fn room(room: Room, out: &mut Vec<Thing>) {
                 for (x, n) in [(a.x, Vec3::NEG_X), (b.x, Vec3::X)] {
                     patch(s, &zs, &[low, high], n, paint, |z, y| Vec3::new(x, y, z));
                 }
-                patch(s, &xs, &zs, -normal, paint, |x, z| Vec3::new(x, low + high - y, z));
+                let other = if up { low } else { high };
+                patch(s, &xs, &zs, -normal, paint, |x, z| Vec3::new(x, other, z));
             });
         })
     };
@@ -340,7 +343,7 @@ fn roof(m: &mut Model) {
     m.part(Stuff::Roof, |s| {
         for (side, from) in [(-1.0, z[0]), (1.0, z[1])] {
             patch(s, &along, &slope, n(side), [255; 3], |a, t| {
-                Vec3::new(a, rim + (ridge - rim) * t, from + (middle - from) * t)
+                Vec3::new(a, rim * (1.0 - t) + ridge * t, from * (1.0 - t) + middle * t)
             });
         }
     });
@@ -355,8 +358,8 @@ fn roof(m: &mut Model) {
             patch(s, &[z[0], z[1]], &[low, rim], normal, board, |b, y| Vec3::new(at, y, b));
             // The gable: the slopes' points from one eave over the ridge to the other, in pairs of equal height.
             for w in slope.windows(2) {
-                let y = |t: f32| rim + (ridge - rim) * t;
-                let across = |t: f32| [z[0], z[1]].map(|f| f + (middle - f) * t);
+                let y = |t: f32| rim * (1.0 - t) + ridge * t;
+                let across = |t: f32| [z[0], z[1]].map(|f| f * (1.0 - t) + middle * t);
                 let corners = [across(w[0])[0], across(w[0])[1], across(w[1])[1], across(w[1])[0]];
                 let ids = [0, 1, 2, 3].map(|k| {
                     let p = Vec3::new(at, y(w[usize::from(k > 1)]), corners[k]);

@@ -112,7 +112,7 @@ impl Model {
         Self { mesh: TriangleMesh::default(), level }
     }
 
-    /// The level, 1 or more.
+    /// The level; 0 leaves out what is small.
     pub(super) fn level(&self) -> u32 {
         self.level
     }

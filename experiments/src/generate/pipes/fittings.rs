@@ -15,7 +15,7 @@ const VALVE: f64 = 0.1;
 const REDUCER: f64 = 0.03;
 
 /// A part and its place.
-pub(super) type Placed = (Part, DAffine3);
+pub(in crate::generate) type Placed = (Part, DAffine3);
 
 /// The transform of a part whose x and y axes point along `x` and `y`.
 fn place(middle: DVec3, x: IVec3, y: IVec3) -> DAffine3 {

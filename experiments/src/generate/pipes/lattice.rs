@@ -25,7 +25,7 @@ pub(super) struct Lattice {
     /// Cells along x, y and z.
     pub(super) size: IVec3,
     taken: Vec<bool>,
-    /// Whether the bay is full of pipes: levels from the bottom, then z, then x.
+    /// Whether the bay is full of pipes: levels from the bottom, then z, then x; empty where there are no galleries.
     full: Vec<bool>,
 }
 
@@ -46,6 +46,11 @@ impl Lattice {
         lattice
     }
 
+    /// A lattice of any size without columns, levels and galleries.
+    pub(super) fn bare(size: IVec3) -> Self {
+        Self { size, taken: vec![false; size.element_product() as usize], full: vec![] }
+    }
+
     /// x and z of the columns' cells.
     pub(super) fn columns(&self) -> Vec<(i32, i32)> {
         let step = BAY as usize;
@@ -61,7 +66,7 @@ impl Lattice {
     /// Whether the cell is one of a gallery, or of the way of a beam.
     pub(super) fn gallery(&self, c: IVec3) -> bool {
         let first = self.size.y / 2 % LEVEL_PERIOD;
-        if (c.y - first) % LEVEL_PERIOD != 0 || self.index(c).is_none() {
+        if self.full.is_empty() || (c.y - first) % LEVEL_PERIOD != 0 || self.index(c).is_none() {
             return false;
         }
         let bay = ((c.y - first) / LEVEL_PERIOD * bays(self.size.z) + c.z / BAY) * bays(self.size.x) + c.x / BAY;

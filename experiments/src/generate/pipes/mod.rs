@@ -24,16 +24,18 @@ mod tests;
 use std::collections::BTreeMap;
 
 use farfield_core::mesh::TriangleMesh;
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, IVec3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::GenerateError;
-use fittings::Placed;
+pub(super) use fittings::Placed;
 use lattice::Lattice;
-use parts::{FAMILIES, Part};
+pub(super) use parts::Part;
+
+use parts::FAMILIES;
 
 /// The paper's total.
 pub const PIPES_1M: u64 = 1_000_000;
@@ -119,6 +121,30 @@ pub fn pipes(settings: &PipesSettings) -> Result<PipesScene, GenerateError> {
         placements: parts.iter().map(|p| (kinds[&p.0], p.1)).collect(),
         size,
     })
+}
+
+/// Pipes through the free cells of a box of cells one unit wide, about `pipe_cells` of them, for other generators: as [`pipes`], without
+/// vessels, steel and galleries. The box stands on y = 0 with its middle at x = z = 0.
+pub(super) fn pipework(
+    size: IVec3,
+    taken: impl Fn(IVec3) -> bool,
+    pipe_cells: usize,
+    rng: &mut ChaCha8Rng,
+) -> Vec<Placed> {
+    let mut lattice = Lattice::bare(size);
+    let range = |k: usize| 0..size[k];
+    for x in range(0) {
+        for y in range(1) {
+            range(2).map(|z| IVec3::new(x, y, z)).filter(|&c| taken(c)).for_each(|c| lattice.take(c, true));
+        }
+    }
+    let lines = route::lines_of(&mut lattice, &[], Some(pipe_cells), rng);
+    lines.iter().flat_map(|line| fittings::pipe(&mut lattice, line, rng)).collect()
+}
+
+/// The mesh of a part of [`pipework`] at a level of detail.
+pub(super) fn part_mesh(part: Part, level: u32) -> TriangleMesh {
+    part.mesh(parts::sides(part.family(), level))
 }
 
 /// The number of sides of each family, so that the total is near `asked`.

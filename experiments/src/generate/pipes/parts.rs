@@ -52,7 +52,7 @@ const SHELL: Paint = [224, 220, 206];
 
 /// The pieces that a pipe is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Piece {
+pub(in crate::generate) enum Piece {
     /// Straight, so many cells long, 1 to [`LONGEST`].
     Tube(u8),
     /// From -x to +y.
@@ -74,7 +74,7 @@ pub(super) const LONGEST: u8 = 3;
 
 /// A kind of part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Part {
+pub(in crate::generate) enum Part {
     /// A piece of pipe.
     Pipe {
         /// Index into [`SYSTEMS`].
@@ -115,7 +115,7 @@ impl Part {
     }
 
     /// Its mesh's name.
-    pub(super) fn name(self) -> String {
+    pub(in crate::generate) fn name(self) -> String {
         match self {
             Part::Pipe { system, narrow, piece } => {
                 let bore = if narrow { "narrow" } else { "wide" };

@@ -108,6 +108,16 @@ fn nozzles(v: &Vessel) -> Vec<(IVec3, IVec3)> {
 
 /// Lays pipes until the lattice is full enough.
 pub(super) fn lines(lattice: &mut Lattice, vessels: &[Vessel], rng: &mut ChaCha8Rng) -> Vec<Line> {
+    lines_of(lattice, vessels, None, rng)
+}
+
+/// Lays pipes until `cells` are laid; `None`: until the lattice is full enough.
+pub(super) fn lines_of(
+    lattice: &mut Lattice,
+    vessels: &[Vessel],
+    pipe_cells: Option<usize>,
+    rng: &mut ChaCha8Rng,
+) -> Vec<Line> {
     let mut out: Vec<Line> = vec![];
     for (start, d) in vessels.iter().flat_map(nozzles) {
         let (system, narrow) = ([0, 1, 1, 2][rng.random_range(0..4)], rng.random_bool(0.5));
@@ -117,6 +127,7 @@ pub(super) fn lines(lattice: &mut Lattice, vessels: &[Vessel], rng: &mut ChaCha8
     let wanted = (FILL * f64::from(cells)) as usize;
     let count = |l: &Lattice| cube(IVec3::ZERO, l.size).filter(|&c| !l.free(c)).count();
     let mut taken = count(lattice);
+    let wanted = pipe_cells.map_or(wanted, |n| taken + n);
     for _ in 0..4 * cells {
         if taken >= wanted {
             break;

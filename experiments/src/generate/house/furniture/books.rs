@@ -34,9 +34,14 @@ fn shelf(k: u32) -> f32 {
     0.092 + k as f32 * (CASE[1] - 0.092) / SHELVES as f32
 }
 
-/// A row of books from the left, some lying, with a gap here and there.
+/// A row of books from the left, with a gap here and there; on level 0 one block with a picture of books.
 fn row(m: &mut Model, y: f32, rng: &mut ChaCha8Rng) {
     let right = 0.5 * CASE[0] - 0.03;
+    if m.level() == 0 {
+        let first = 32 * rng.random_range(0..4);
+        let all = [book(first)[0], book(first + 31)[1]];
+        return m.shown(all, |s| slab(s, [0.0, y, 0.17], [2.0 * right, 0.24, 0.2], 0.0, 0, [255; 3]));
+    }
     let mut x = -right;
     let room = (CASE[1] - 0.092) / SHELVES as f32 - 0.05;
     // Fewer and thicker books on low levels.

@@ -11,13 +11,13 @@ use crate::generate::solid::{Paint, frame};
 fn curtains(m: &mut Model, w: f32, low: f32, paint: Paint) {
     let (sides, fine) = (m.sides(), 6 + 6 * m.level());
     m.part(Stuff::Paint, |s| {
-        rod(s, [-0.5 * w - 0.4, 2.3, 0.11], [0.5 * w + 0.4, 2.3, 0.11], 0.014, sides, [110, 84, 60]);
+        rod(s, [-0.5 * w - 0.4, 2.3, 0.17], [0.5 * w + 0.4, 2.3, 0.17], 0.014, sides, [110, 84, 60]);
         for x in [-1.0, 1.0] {
-            s.ball(to(x * (0.5 * w + 0.42), 2.3, 0.11), 2 + sides / 8, [110, 84, 60], |_| 0.03);
+            s.ball(to(x * (0.5 * w + 0.42), 2.3, 0.17), 2 + sides / 8, [110, 84, 60], |_| 0.03);
             rod(
                 s,
                 [x * (0.5 * w + 0.33), 2.3, 0.0],
-                [x * (0.5 * w + 0.33), 2.3, 0.11],
+                [x * (0.5 * w + 0.33), 2.3, 0.17],
                 0.009,
                 sides / 2,
                 [110, 84, 60],
@@ -30,7 +30,7 @@ fn curtains(m: &mut Model, w: f32, low: f32, paint: Paint) {
                 .map(|i| {
                     let t = i as f32 / fine as f32;
                     let x = side * (0.5 * w + 0.1) + 0.42 * (t - 0.5);
-                    Vec2::new(x, 0.11 + 0.035 * (t * 31.0).sin() + 0.01 * (t * 11.0).sin())
+                    Vec2::new(x, 0.17 + 0.035 * (t * 31.0).sin() + 0.01 * (t * 11.0).sin())
                 })
                 .collect();
             s.cloth(Affine3A::IDENTITY, &line, 0.006, [low, 2.31], paint);

@@ -11,6 +11,9 @@ const TOP: Paint = [122, 92, 68];
 
 /// A handle across a front.
 fn handle(m: &mut Model, x: f32, y: f32, z: f32, long: f32) {
+    if m.level() == 0 {
+        return m.part(Stuff::Paint, |s| slab(s, [x, y, z + 0.02], [long, 0.012, 0.03], 0.0, 0, STEEL));
+    }
     let n = 4 + m.level();
     m.part(Stuff::Paint, |s| {
         let h = 0.5 * long;

@@ -171,7 +171,7 @@ fn desk(m: &mut Model) {
         slab(s, [0.1, 0.885, -0.186], [0.57, 0.33, 0.006], 0.002, n, [66, 98, 140]);
         slab(s, [0.1, 0.745, 0.08], [0.42, 0.014, 0.14], 0.004, n, [60, 60, 64]);
         // Keys, as rows of little blocks.
-        for row in 0..5 {
+        for row in 0..if n == 0 { 0 } else { 5 } {
             for k in 0..14 {
                 let at = [-0.094 + 0.029 * k as f32 + 0.006 * row as f32, 0.757, 0.03 + 0.025 * row as f32];
                 slab(s, at, [0.024, 0.008, 0.02], 0.003, n.min(1), [214, 214, 210]);
@@ -221,6 +221,9 @@ fn office_chair(m: &mut Model) {
 
 /// A radiator of many ribs, back at z = 0.
 fn radiator(m: &mut Model) {
+    if m.level() == 0 {
+        return m.part(Stuff::Paint, |s| slab(s, [0.0, 0.12, 0.08], [1.08, 0.54, 0.09], 0.0, 0, WHITE));
+    }
     let sides = 3 + m.level();
     m.part(Stuff::Paint, |s| {
         for k in 0..18 {

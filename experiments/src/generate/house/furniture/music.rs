@@ -77,7 +77,7 @@ fn keys(m: &mut Model, n: u32) {
 }
 
 fn strings(m: &mut Model) {
-    let count = 10 + 4 * m.level().min(20);
+    let count = 2 + 4 * m.level().min(20);
     m.part(Stuff::Paint, |s| {
         for k in 0..count {
             let t = k as f32 / (count - 1) as f32;

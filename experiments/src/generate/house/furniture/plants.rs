@@ -53,7 +53,7 @@ fn pot(m: &mut Model, r: f32, h: f32, paint: Paint) {
 fn palm(m: &mut Model) {
     pot(m, 0.19, 0.34, [184, 104, 72]);
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let (fronds, leaflets) = (9 + m.level(), 3 + m.level());
+    let (fronds, leaflets) = (if m.level() == 0 { 5 } else { 9 + m.level() }, 2 + m.level());
     m.part(Stuff::Carpet, |s| {
         for f in 0..fronds {
             let angle = 2.4 * f as f32 + rng.random_range(-0.2..0.2);
@@ -82,7 +82,7 @@ fn palm(m: &mut Model) {
 fn rubber(m: &mut Model, scale: f32) {
     pot(m, 0.16 * scale, 0.26 * scale, [228, 226, 218]);
     let mut rng = ChaCha8Rng::seed_from_u64(8);
-    let leaves = 14 + 6 * m.level();
+    let leaves = 6 + 7 * m.level();
     m.part(Stuff::Carpet, |s| {
         for stem in 0..3 {
             let (sn, c) = (2.1 * stem as f32).sin_cos();
@@ -121,15 +121,11 @@ fn foliage(m: &mut Model, at: Vec3, radii: Vec3, paint: Paint, rng: &mut ChaCha8
             let Some(d) = d.try_normalize() else { continue };
             let foot = at + d * radii * rng.random_range(0.86..1.0);
             let off = Vec3::new(rng.random_range(-0.6..0.6), rng.random_range(-0.5..0.5), rng.random_range(-0.6..0.6));
-            let size = rng.random_range(0.6..1.2) * (0.10 + 0.3 / m_level(n));
-            let lit = rng.random_range(0.8..1.25) * (0.9 + 0.25 * d.y);
+            let size = rng.random_range(0.6..1.2) * (0.13 + 0.7 / n as f32);
+            let lit = rng.random_range(0.95..1.5) * (1.0 + 0.3 * d.y);
             leaf(s, foot, foot + (d + off).normalize() * size, 0.45 * size, shade(paint, lit));
         }
     });
-}
-
-fn m_level(n: u32) -> f32 {
-    n as f32
 }
 
 /// A tree of seeded shape, about `high` high: a bent trunk, branches, and foliage at their ends.
@@ -139,7 +135,8 @@ pub(in crate::generate::house) fn crown(m: &mut Model, high: f32, paint: Paint, 
     let fork = Vec3::new(rng.random_range(-0.2..0.2), 0.4 * high, rng.random_range(-0.2..0.2));
     let bark = [118, 96, 76];
     let mut ends = vec![];
-    for k in 0..7 {
+    let branches = if m.level() == 0 { 4 } else { 7 };
+    for k in 0..branches {
         let angle = 2.4 * k as f32 + rng.random_range(-0.4..0.4);
         let out = if k == 0 { 0.0 } else { rng.random_range(0.14..0.27) * high };
         let y = if k == 0 { 0.84 } else { rng.random_range(0.58..0.78) } * high;
@@ -168,7 +165,7 @@ pub(in crate::generate::house) fn bush(m: &mut Model, paint: Paint, flowers: Opt
         let r = rng.random_range(0.34..0.46);
         foliage(m, Vec3::new(x, 0.8 * r, rng.random_range(-0.15..0.15)), Vec3::new(r, 0.95 * r, r), paint, &mut rng);
     }
-    let Some(color) = flowers else { return };
+    let Some(color) = flowers.filter(|_| m.level() > 0) else { return };
     let (count, n) = (8 + 3 * m.level(), 2 + m.level() / 6);
     m.part(Stuff::Paint, |s| {
         for _ in 0..count {
@@ -184,11 +181,12 @@ pub(in crate::generate::house) fn bush(m: &mut Model, paint: Paint, flowers: Opt
 /// A clipped hedge along x, `long` long.
 pub(in crate::generate::house) fn hedge(m: &mut Model, long: f32, high: f32, seed: u64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let (n, leaves) = (1 + m.level() / 2, (long * 2.0) as u32 * m.level() * m.level());
+    let level = m.level();
+    let (n, leaves) = (level.div_ceil(2), (long * 2.0) as u32 * level.pow(2).min(level * 12));
     let paint = [66, 104, 48];
     m.part(Stuff::Carpet, |s| {
-        // Pieces of a metre, so that there is room for bumps.
-        let pieces = long.round() as u32;
+        // Pieces of a metre, so that there is room for bumps; longer on low levels.
+        let pieces = if n < 2 { 2 } else { long.round() as u32 };
         for k in 0..pieces {
             let first = s.mesh.positions.len();
             let x = (k as f32 + 0.5) * long / pieces as f32 - 0.5 * long;
