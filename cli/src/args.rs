@@ -91,6 +91,36 @@ pub(crate) enum Command {
         #[arg(long, default_value = "store")]
         store: PathBuf,
     },
+    /// Panoramic samples as EXR files: six faces, each with albedo, depth, normal and object number.
+    Sample {
+        #[command(flatten)]
+        input: Input,
+        /// Where in the world: one sample of all geometry.
+        #[arg(
+            long,
+            value_name = "X,Y,Z",
+            allow_hyphen_values = true,
+            value_parser = place,
+            conflicts_with = "pipeline",
+            required_unless_present = "pipeline"
+        )]
+        at: Option<Place>,
+        /// The samples that this pipeline's far field was built from.
+        #[arg(long)]
+        pipeline: Option<String>,
+        /// In this cell; without it in that of the path's first camera.
+        #[arg(long, requires = "pipeline", conflicts_with = "at")]
+        cell: Option<u32>,
+        /// Side of a face, pixels.
+        #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=4096))]
+        face_px: u32,
+        /// The file, .exr; of a pipeline the folder of its files.
+        #[arg(long)]
+        out: PathBuf,
+        /// Where what is built is kept.
+        #[arg(long, default_value = "store", conflicts_with = "at")]
+        store: PathBuf,
+    },
     /// Joins runs into one table and one plot of error against time.
     Compare {
         /// Folders that `run` wrote.
@@ -115,6 +145,17 @@ pub(crate) enum Command {
         #[arg(long)]
         out: PathBuf,
     },
+}
+
+/// A place in the world, scene units.
+pub(crate) type Place = [f64; 3];
+
+/// Three finite numbers with commas between them.
+fn place(text: &str) -> Result<Place, String> {
+    let numbers: Vec<f64> =
+        text.split(',').filter_map(|n| n.trim().parse().ok()).filter(|n: &f64| n.is_finite()).collect();
+    let three = numbers.try_into().ok().filter(|_| text.split(',').count() == 3);
+    three.ok_or_else(|| "a place is three numbers, as in 1.5,2,-3".to_owned())
 }
 
 /// The generator of that name; names that are not there have been refused before.

@@ -8,7 +8,7 @@ use farfield_experiments::config::{self, Experiment, Generated};
 use farfield_experiments::failure::Failure;
 use farfield_experiments::results::Summary;
 use farfield_experiments::run::{self, Options};
-use farfield_experiments::{images, list, plan, report, scene};
+use farfield_experiments::{images, list, plan, report, sample, scene};
 
 use crate::args::{Args, Command, Input};
 
@@ -40,6 +40,13 @@ pub(crate) fn run(args: Args, cancel: &AtomicBool) -> Result<(), Failure> {
         }
         Command::Render { input, pipeline, frame, out, store } => {
             render(&load(&input)?, &pipeline, frame, &out, &options(store))
+        }
+        Command::Sample { input, at, pipeline, cell, face_px, out, store } => {
+            let (experiment, options) = (load(&input)?, options(store));
+            print(&match (at, pipeline) {
+                (Some(place), _) => sample::at(&experiment, place, face_px, &out, &options)?,
+                (None, p) => sample::of_cell(&experiment, &p.unwrap_or_default(), cell, face_px, &out, &options)?,
+            })
         }
         Command::Compare { runs, out } => compare(&runs, &out),
         Command::Scene { kind, triangles, seed, out } => generate(kind, triangles, seed, &out),

@@ -20,7 +20,7 @@ fn files(folder: &str, ending: &str) -> Vec<PathBuf> {
 }
 
 /// The arguments of a quoted command; `None` where the text is something else. What stands for something is given a value: `N` a
-/// number, `KIND` a scene's; options in brackets are taken; `...` is left out.
+/// number, `X,Y,Z` a place, `KIND` a scene's; options in brackets are taken; `...` is left out.
 fn arguments(quoted: &str) -> Option<Vec<String>> {
     let command = quoted.split(" #").next().unwrap_or(quoted).trim();
     let rest = ["farfield ", "cargo run --release -- "].iter().find_map(|start| command.strip_prefix(start));
@@ -35,6 +35,7 @@ fn arguments(quoted: &str) -> Option<Vec<String>> {
         match bare.trim_end_matches('\u{2026}') {
             "N" => "1".to_owned(),
             "KIND" => "park".to_owned(),
+            "X,Y,Z" => "1,2,3".to_owned(),
             other => other.to_owned(),
         }
     };
@@ -65,7 +66,8 @@ fn taken(words: &[String]) -> Result<(), String> {
         | Command::Plan { input, .. }
         | Command::Build { input, .. }
         | Command::Run { input, .. }
-        | Command::Render { input, .. } => input,
+        | Command::Render { input, .. }
+        | Command::Sample { input, .. } => input,
         _ => return Ok(()),
     };
     let there = input.file.extension().is_none() || root().join(&input.file).is_file();

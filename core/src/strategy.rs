@@ -4,7 +4,7 @@
 
 use std::fmt::Debug;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::camera::ViewModel;
@@ -172,6 +172,12 @@ pub trait FarView: Send + Sync {
 
     /// The draws of this frame, of blocks that are resident.
     fn draw(&self, resident: &dyn Fn(Block) -> bool, view: &View<'_>, out: &mut Vec<Draw>) -> Achieved;
+
+    /// Where the payloads of a split were sampled from, local frame; `cell` is the one that was baked. By default none: what was not
+    /// made of samples has no viewpoints.
+    fn viewpoints(&self, _cell: &Cell, _split: SplitId) -> Vec<DVec3> {
+        vec![]
+    }
 }
 
 /// A view to draw: of an eye or of a light.

@@ -18,6 +18,7 @@ pub mod progress;
 pub mod report;
 pub mod results;
 pub mod run;
+pub mod sample;
 pub mod scene;
 pub mod store;
 pub mod walk;

@@ -26,6 +26,11 @@ impl Progress {
         self.bar(format!("walking {pipeline}"), "frames", n)
     }
 
+    /// A bar over a pipeline's samples.
+    pub fn samples(&self, pipeline: &str, n: usize) -> Bar {
+        self.bar(format!("sampling {pipeline}"), "samples", n)
+    }
+
     fn bar(&self, what: String, unit: &str, n: usize) -> Bar {
         let target = if self.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let style = format!("{{msg:40!}} [{{bar:30}}] {{pos}}/{{len}} {unit}, {{eta}} left");

@@ -91,14 +91,18 @@ pub fn prepare(experiment: &Experiment, options: &Options<'_>) -> Result<Prepare
     Ok(Prepared { scene, source: loaded.source, views, cameras, shading, turn_rad_per_frame, divisions })
 }
 
-fn open_store(options: &Options<'_>) -> Result<Store, Failure> {
+pub(crate) fn open_store(options: &Options<'_>) -> Result<Store, Failure> {
     let failed = |e| Failure::work(format!("the store {} cannot be used", options.store.display()), e);
     // The messages outlive this call's borrow, so they go to standard error themselves.
     Store::open(&options.store, Box::new(|message| eprintln!("{message}"))).map_err(failed)
 }
 
 /// The captures that the pipelines need, if any does.
-fn captures(experiment: &Experiment, prepared: &Prepared, which: &[usize]) -> Result<Box<dyn Capture>, Failure> {
+pub(crate) fn captures(
+    experiment: &Experiment,
+    prepared: &Prepared,
+    which: &[usize],
+) -> Result<Box<dyn Capture>, Failure> {
     let mut needed = false;
     for &i in which {
         let p = &experiment.pipelines[i];
@@ -108,9 +112,14 @@ fn captures(experiment: &Experiment, prepared: &Prepared, which: &[usize]) -> Re
     if !needed {
         return Ok(Box::new(NoCapture));
     }
+    capture_of(experiment, &prepared.scene)
+}
+
+/// The captures that `[build]` names.
+pub(crate) fn capture_of(experiment: &Experiment, scene: &Arc<Scene>) -> Result<Box<dyn Capture>, Failure> {
     device::available(experiment.build.capture)?;
     let failed = |f| Failure::during(format!("captures by {}", experiment.build.capture.name()), f);
-    build::capture(experiment.build.capture, &prepared.scene).map_err(failed)
+    build::capture(experiment.build.capture, scene).map_err(failed)
 }
 
 /// Builds what `which` pipelines need and the store lacks.
@@ -393,6 +402,13 @@ fn with_errors(row: &mut FrameRow, e: &FrameErrors) {
     row.depth_off_fraction = Some(e.depth_off_fraction);
 }
 
+/// The number of a pipeline by its name.
+pub(crate) fn position(experiment: &Experiment, pipeline: &str) -> Result<usize, Failure> {
+    let names = || experiment.pipelines.iter().map(|p| format!("\"{}\"", p.name)).collect::<Vec<_>>().join(", ");
+    let unknown = || Failure::input(format!("no pipeline is called \"{pipeline}\""), format!("pipelines: {}", names()));
+    experiment.pipelines.iter().position(|p| p.name == pipeline).ok_or_else(unknown)
+}
+
 /// `render`: one frame of one pipeline, all of it resident.
 ///
 /// # Errors
@@ -403,13 +419,7 @@ pub fn render(
     number: usize,
     options: &Options<'_>,
 ) -> Result<(Camera, Rendered), Failure> {
-    let Some(i) = experiment.pipelines.iter().position(|p| p.name == pipeline) else {
-        let names: Vec<String> = experiment.pipelines.iter().map(|p| format!("\"{}\"", p.name)).collect();
-        return Err(Failure::input(
-            format!("no pipeline is called \"{pipeline}\""),
-            format!("pipelines: {}", names.join(", ")),
-        ));
-    };
+    let i = position(experiment, pipeline)?;
     if number >= experiment.view.frames {
         let cause = format!("the path has frames 0 to {}", experiment.view.frames - 1);
         return Err(Failure::input(format!("there is no frame {number}"), cause));

@@ -66,6 +66,18 @@ mod tests {
     }
 
     #[test]
+    fn a_small_pixel_is_its_area_over_the_cube_of_its_distance() {
+        let c = Camera::cube(DVec3::ZERO, 1 << 20, 0.1)[0];
+        let edge = 2.0 / f64::from(1 << 20);
+        for (x, y) in [(1 << 19, 1 << 19), (5, 7), (1 << 18, 1000)] {
+            let t = |i: u32| (f64::from(i) + 0.5) * edge - 1.0;
+            let expected = edge * edge / (1.0 + t(x) * t(x) + t(y) * t(y)).powf(1.5);
+            let found = pixel_solid_angle_sr(&c, x, y);
+            assert!((found / expected - 1.0).abs() < 1e-6, "{x} {y}: {found} against {expected}");
+        }
+    }
+
+    #[test]
     fn a_large_pixel_has_the_angle_sum_of_the_paper_and_a_tiny_one_has_its_area() {
         let mut c = Camera::looking(DVec3::ZERO, -Vec3::Z, Vec3::Y, 1.2, [5, 4], 0.1);
         c.left *= 1.5;

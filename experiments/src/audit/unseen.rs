@@ -7,12 +7,13 @@
 
 use farfield_core::backend::Backend;
 use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind};
+use farfield_core::panorama::pixel_solid_angle_sr;
 use farfield_core::{Camera, Fault};
 use glam::DVec3;
 use rand::{Rng, RngExt};
 
 use super::{CANDIDATE, CellAudit, REFERENCE, SERVED_TRIES};
-use crate::measure::{DEPTH_OFF, pixel_solid_angle};
+use crate::measure::DEPTH_OFF;
 
 /// Edge of a cube's picture, pixels.
 pub(super) const FACE_PX: u32 = 128;
@@ -57,7 +58,7 @@ impl CellAudit<'_> {
         let unseen = |i: usize| r.hit(i) && !(c.hit(i) && c.depth[i] <= r.depth[i] * (1.0 + DEPTH_OFF));
         let [w, h] = r.size;
         let pixels = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
-        Ok(pixels.filter(|&(x, y)| unseen(r.at(x, y))).map(|(x, y)| pixel_solid_angle(camera, x, y)).sum())
+        Ok(pixels.filter(|&(x, y)| unseen(r.at(x, y))).map(|(x, y)| pixel_solid_angle_sr(camera, x, y)).sum())
     }
 }
 

@@ -7,13 +7,11 @@
 mod depth;
 mod holes;
 mod psnr;
-mod solid_angle;
 mod temporal;
 
 pub use depth::{DEPTH_OFF, depth_off_fraction};
 pub use holes::{hole_mask, hole_width_px};
 pub use psnr::{SquaredError, cap_db};
-pub(crate) use solid_angle::pixel_solid_angle;
 pub use temporal::{Change, Reads, error_luma, temporal_change};
 
 use farfield_core::image::{Picture, SurfaceImage};

@@ -31,7 +31,10 @@ impl<'a> OnDemand<'a> {
     /// # Errors
     /// What the partition gives.
     pub(super) fn enter(&mut self, opened: &mut Opened<'_>, camera: &Camera) -> Result<(), Fault> {
-        let Some(id) = opened.division.cells.find(camera) else { return Ok(()) };
+        opened.division.cells.find(camera).map_or(Ok(()), |id| self.enter_cell(opened, id))
+    }
+
+    fn enter_cell(&mut self, opened: &mut Opened<'_>, id: CellId) -> Result<(), Fault> {
         if opened.built.cells.contains_key(&id) {
             return Ok(());
         }
@@ -56,10 +59,17 @@ impl<'a> OnDemand<'a> {
     ///
     /// # Errors
     /// What building gives.
-    pub fn serve(mut self, opened: &mut Opened<'_>, camera: &Camera) -> Result<(), Fault> {
-        self.enter(opened, camera)?;
-        let cell: Vec<CellId> = opened.cell_of(camera).into_iter().collect();
-        self.build(opened, &cell)
+    pub fn serve(self, opened: &mut Opened<'_>, camera: &Camera) -> Result<(), Fault> {
+        opened.division.cells.find(camera).map_or(Ok(()), |id| self.serve_cell(opened, id))
+    }
+
+    /// Builds a cell, whatever time it takes.
+    ///
+    /// # Errors
+    /// What building gives.
+    pub fn serve_cell(mut self, opened: &mut Opened<'_>, id: CellId) -> Result<(), Fault> {
+        self.enter_cell(opened, id)?;
+        self.build(opened, &[id])
     }
 
     /// Builds the cells that were `asked` for, first to last, as long as there is time.

@@ -6,11 +6,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use farfield_core::cell::{Active, Cell};
 use farfield_core::claim::Claim;
 use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind, Shading};
-use farfield_core::id::{AssetId, Block, CellId, PayloadRef, TargetId};
+use farfield_core::id::{AssetId, Block, CellId, PayloadRef, SplitId, TargetId};
 use farfield_core::payload::Payload;
 use farfield_core::scene::{ChunkSet, Scene};
 use farfield_core::strategy::{Candidate, Covers, Demand, DrawBudget, FarView, LeftOut, View};
 use farfield_core::{Aabb, Camera, Fault};
+use glam::DVec3;
 
 use super::residency::Residency;
 use crate::build::{Built, BuiltCell, Division};
@@ -197,6 +198,18 @@ impl<'a> Opened<'a> {
         let mut draws = vec![];
         self.with_view(cell, camera, |far, view| far.draw(&|_| true, view, &mut draws));
         draws
+    }
+
+    /// Where a cell's far field was sampled from, split by split, each with what is far there.
+    pub fn viewpoints(&self, id: CellId) -> Vec<(SplitId, &ChunkSet, DVec3)> {
+        let (Some(built), Some(far)) = (self.built.cells.get(&id), self.views.get(&id)) else { return vec![] };
+        let cell = &built.cell;
+        let mut out = vec![];
+        for (i, split) in cell.splits.iter().enumerate() {
+            let id = SplitId(i as u32);
+            out.extend(far.viewpoints(cell, id).into_iter().map(|eye| (id, &split.far, eye)));
+        }
+        out
     }
 
     /// Original triangles over triangles that a cell draws, not culled to any frustum; 0 where nothing is simplified, or where

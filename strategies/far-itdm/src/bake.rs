@@ -147,7 +147,7 @@ fn cube(
 ) -> Result<(Payload, Vec<Piece>, u64), Fault> {
     let eye = p.eye();
     if mesh.indices.is_empty() {
-        // All that it sees an ancestor has.
+        // All that it sees an ancestor has, or it sees nothing. The index, JSON, has no word for an empty box.
         let bounds = Aabb::of([eye.as_vec3()]);
         return Ok((Payload { origin: eye, bounds, parts: vec![] }, vec![], 0));
     }
@@ -243,5 +243,45 @@ fn report(cubes: &[Cube], out: &dyn Sink) {
         let share = 100.0 * (points - kept) as f64 / points as f64;
         let reason = format!("{share:.1} % of the points of {} delta samples are seen by an ancestor", deltas.len());
         out.left_out(LeftOut { stage: "redundant points".into(), reason, decided: "build".into() });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cube_of_nothing_has_a_box_that_an_index_can_hold() {
+        let n = 4;
+        let nothing = SurfaceImage {
+            size: [n; 2],
+            albedo: vec![[0; 4]; 16],
+            normal: vec![0; 16],
+            depth: vec![f32::INFINITY; 16],
+            object: vec![0; 16],
+        };
+        let views = Camera::cube(DVec3::new(1.0, 2.0, 3.0), n, 0.1).map(|c| (c, nothing.clone()));
+        let limits = Limits { border_px: 0.5, interior_px: 0.5, tree_triangles: 1 };
+        let making = Making { face_px: n, skins: None, same_px: None, limits, atlas_px: 64 };
+        let mesh = Simplified { positions: vec![], indices: vec![], views: vec![] };
+        let (payload, pieces, texels) = cube(&making, &Panorama::new(&views), &mesh, LocalPayload(0)).unwrap();
+        assert_eq!((pieces.len(), texels), (0, 0));
+        let cube = Cube {
+            payload: 0,
+            split: 0,
+            eye: payload.origin,
+            parent: None,
+            object: most_seen(&views),
+            bytes: bytes(&payload),
+            bounds: payload.bounds,
+            pieces,
+            points: 0,
+            kept: 0,
+            mended: 0,
+            dense_triangles: 0,
+            texels,
+        };
+        let index = Index { cubes: vec![cube] };
+        assert_eq!(Index::decode("test", &index.encode().unwrap()).unwrap(), index);
     }
 }

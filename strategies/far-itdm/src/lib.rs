@@ -52,6 +52,9 @@ use simplify::Limits;
 const INCREMENTAL: &str = "incremental-tdm";
 const PLAIN: &str = "textured-depth-mesh";
 
+/// 2: cubes of nothing have boxes that can be read back; what turns away mends nothing.
+const VERSION: u32 = 2;
+
 /// Incremental textured depth meshes.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -299,6 +302,10 @@ impl FarField for IncrementalTdm {
         let budget = DrawBudget { payloads: self.scan_budget, triangles: self.triangle_budget };
         Ok(Box::new(view::Cubes { asset: cell.0, index, budget, error_px: self.border_px.max(self.interior_px) }))
     }
+
+    fn version(&self) -> u32 {
+        VERSION
+    }
 }
 
 #[typetag::serde(name = "textured-depth-mesh")]
@@ -336,6 +343,10 @@ impl FarField for TexturedDepthMesh {
         let index = Index::decode(&format!("index of asset {}", cell.0.0), cell.1)?;
         let budget = DrawBudget { payloads: Some(1), triangles: None };
         Ok(Box::new(view::Cubes { asset: cell.0, index, budget, error_px: self.border_px.max(self.interior_px) }))
+    }
+
+    fn version(&self) -> u32 {
+        VERSION
     }
 }
 

@@ -64,11 +64,8 @@ pub(crate) fn joined(all: &[Panorama<'_>], tests: &SkinTests, cx: &Context<'_>) 
     collect(cx.run, all.len(), &|i| {
         cx.check()?;
         let mut joined = Joined::new(&all[i], tests);
-        for (j, other) in all.iter().enumerate() {
-            if i != j {
-                joined.see_past(&all[i], other);
-            }
-        }
+        let others = all.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, other)| other);
+        joined.see_past_all(&all[i], others);
         Ok(joined)
     })
 }

@@ -5,9 +5,11 @@
 //! spent; where the budget ends within a line of ancestors, its rest is left out. Cubes are drawn with their projected textures.
 //! A cube's parts are culled to the frustum one by one. O(cubes log cubes + parts) a frame.
 
+use farfield_core::cell::Cell;
 use farfield_core::draw::{Draw, DrawWhat};
-use farfield_core::id::{AssetId, Block, LocalPayload, PayloadRef};
+use farfield_core::id::{AssetId, Block, LocalPayload, PayloadRef, SplitId};
 use farfield_core::strategy::{Achieved, Candidate, DrawBudget, FarView, View};
+use glam::DVec3;
 
 use crate::index::{Cube, Index};
 
@@ -103,18 +105,23 @@ impl FarView for Cubes {
         }
         achieved
     }
+
+    fn viewpoints(&self, _cell: &Cell, split: SplitId) -> Vec<DVec3> {
+        self.index.cubes.iter().filter(|c| c.split == split.0).map(|c| c.eye).collect()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::index::Piece;
-    use farfield_core::cell::Active;
-    use farfield_core::id::{CellId, MaterialId, SplitId};
+    use farfield_core::cell::{Active, Outline};
+    use farfield_core::id::{CellId, MaterialId};
     use farfield_core::mesh::TriangleMesh;
+    use farfield_core::region::Region;
     use farfield_core::scene::{Material, Placement, Scene, SceneBuilder};
     use farfield_core::{Aabb, Camera};
-    use glam::{DAffine3, DVec3, Vec3};
+    use glam::{DAffine3, Vec3};
 
     fn scene() -> Scene {
         let mut b = SceneBuilder::default();
@@ -202,5 +209,15 @@ mod tests {
     #[test]
     fn a_cube_that_is_not_there_is_counted() {
         assert_eq!(drawn(&cubes(None, None), 3.9, |id| id != 2), (vec![0, 4, 1, 3], false, 1));
+    }
+
+    #[test]
+    fn viewpoints_are_the_samples_places_split_by_split() {
+        let mut far = cubes(None, None);
+        far.index.cubes[3].split = 1;
+        let outline = Outline { id: CellId(0), region: Region::Everywhere, centre: Vec3::ZERO, neighbours: vec![] };
+        let cell = Cell { outline, splits: vec![], sectors: vec![], own: vec![], claims: vec![] };
+        let x = |split: u32| -> Vec<f64> { far.viewpoints(&cell, SplitId(split)).iter().map(|e| e.x).collect() };
+        assert_eq!((x(0), x(1), x(2)), (vec![2.0, 1.0, 3.0, 4.0], vec![0.0], vec![]));
     }
 }

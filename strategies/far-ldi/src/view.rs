@@ -4,10 +4,11 @@
 //! another window of the split, so that windows do not decide what is drawn.
 
 use farfield_core::Camera;
+use farfield_core::cell::Cell;
 use farfield_core::draw::{Draw, DrawWhat};
-use farfield_core::id::{AssetId, Block, LocalPayload, PayloadRef};
+use farfield_core::id::{AssetId, Block, LocalPayload, PayloadRef, SplitId};
 use farfield_core::strategy::{Achieved, Candidate, FarView, View};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::index::{Index, Picture};
 
@@ -59,5 +60,11 @@ impl FarView for Warped {
             out.push(Draw { what, bounds: p.bounds, error_px });
         }
         achieved
+    }
+
+    /// The cell's centre, which every image stands for; construction images are taken around it.
+    fn viewpoints(&self, cell: &Cell, split: SplitId) -> Vec<DVec3> {
+        let any = self.index.pictures.iter().any(|p| p.split == split.0);
+        any.then_some(cell.outline.centre.as_dvec3()).into_iter().collect()
     }
 }

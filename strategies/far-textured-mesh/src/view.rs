@@ -4,11 +4,12 @@
 //! meet; the rest is drawn by projective texturing. O(objects) a frame.
 
 use farfield_core::Aabb;
-use farfield_core::cell::Active;
+use farfield_core::cell::{Active, Cell};
 use farfield_core::draw::{Draw, DrawWhat};
-use farfield_core::id::{AssetId, Block, LocalPayload, PayloadRef};
+use farfield_core::id::{AssetId, Block, LocalPayload, PayloadRef, SplitId};
 use farfield_core::scene::ChunkSet;
 use farfield_core::strategy::{Achieved, Candidate, FarView, View};
+use glam::DVec3;
 
 use crate::index::{Entry, Index};
 
@@ -108,5 +109,11 @@ impl FarView for TexturedView {
             }
         }
         achieved
+    }
+
+    /// The cell's centre; the further views of objects that one view does not serve are not named.
+    fn viewpoints(&self, cell: &Cell, split: SplitId) -> Vec<DVec3> {
+        let any = self.index.meshes.iter().any(|m| m.split == split.0);
+        any.then_some(cell.outline.centre.as_dvec3()).into_iter().collect()
     }
 }
