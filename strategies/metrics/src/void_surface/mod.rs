@@ -68,7 +68,7 @@ pub struct VoidSurface {
     pub max_sr: f64,
     /// An edge between two pixels at a smaller angle to the view ray is a skin.
     #[serde(default = "five")]
-    #[schemars(range(min = 0.0, max = 90.0), extend("unit" = "degrees"))]
+    #[schemars(range(min = 0.0, max = 90.0), extend("unit" = "deg"))]
     pub alpha_deg: f32,
     /// An edge that reaches farther is a skin; by default none is for that.
     #[serde(default)]
