@@ -108,10 +108,10 @@ pub fn pack(groups: &[Vec<[u32; 2]>], side: u32, max_layers: u32) -> Result<Pack
     Ok(out)
 }
 
-/// An empty atlas.
-pub fn blank(side: u32, layers: u32) -> AtlasPart {
-    let n = side as usize * side as usize * layers as usize;
-    AtlasPart { size: [side, side], layers, albedo: vec![[0; 4]; n], normal: vec![[128, 128, 128, 0]; n] }
+/// An empty atlas of layers of this width and height.
+pub fn blank(size: [u32; 2], layers: u32) -> AtlasPart {
+    let n = size[0] as usize * size[1] as usize * layers as usize;
+    AtlasPart { size, layers, albedo: vec![[0; 4]; n], normal: vec![[128, 128, 128, 0]; n] }
 }
 
 #[cfg(test)]

@@ -13,7 +13,8 @@ pub enum Quantity {
     HoleWidthPx,
     /// Original triangles drawn in a frame.
     NearTriangles,
-    /// Solid angle in which a viewpoint sees what no sample saw, steradians.
+    /// Far surfaces that a viewpoint should see and does not, over the whole sphere of directions, steradians.
+    #[serde(rename = "unseen_solid_angle_sr")]
     UnseenSolidAngle,
 }
 

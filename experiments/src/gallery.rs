@@ -90,10 +90,13 @@ mod tests {
     #[test]
     fn a_few_frames_along_the_path_and_the_worst_are_kept() {
         let picture = |v: u8| Picture { size: [4, 4], rgba: vec![[v, v, v, 255]; 16] };
-        let rendered = |v: u8| Rendered {
-            picture: picture(v),
-            surface: farfield_core::image::SurfaceImage { size: [4, 4], object: vec![1; 16], ..Default::default() },
+        let surface = farfield_core::image::SurfaceImage {
+            size: [4, 4],
+            object: vec![1; 16],
+            depth: vec![2.0; 16],
+            ..Default::default()
         };
+        let rendered = |v: u8| Rendered { picture: picture(v), surface: surface.clone() };
         let references = References::new([4, 4]).unwrap();
         let mut g = Gallery::new(2);
         for i in 0..20usize {

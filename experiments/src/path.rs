@@ -67,7 +67,8 @@ pub fn cameras(
         "line" => Ok(path::line(&job)),
         "orbit" => Ok(path::orbit(&job)),
         ROUTE => {
-            let none = || Failure::input("the path \"route\"", "the scene brings no route along; a house and a plant do");
+            let none =
+                || Failure::input("the path \"route\"", "the scene brings no route along; a house and a plant do");
             let route = along.ok_or_else(none)?;
             path::route(&job, &route.points, route.rounding).map_err(failed)
         }

@@ -173,6 +173,23 @@ pub struct ErrorSummary {
     pub flip: Option<MeanMax>,
     /// Pixels where the reference shows an object and the candidate the background, over all pixels.
     pub hole_fraction: MeanMax,
+    /// Pixels whose depth differs from the reference's by more than 1 %, or where only one of the two shows a surface, over all
+    /// pixels.
+    #[serde(default)]
+    pub depth_off_fraction: MeanMax,
+    /// Pairs of frames that follow each other over which change was measured.
+    #[serde(default)]
+    pub frame_pairs: usize,
+    /// Change of the error from frame to frame, over these pairs: mean over pixels of |E_i - E_(i-1)|, E = the candidate's luminance
+    /// less the reference's, grey levels.
+    #[serde(default)]
+    pub temporal_change_grey_levels: MeanMax,
+    /// Of the pairs, those whose two frames are served by different cells.
+    #[serde(default)]
+    pub frame_pairs_at_borders: usize,
+    /// The same over those.
+    #[serde(default)]
+    pub temporal_change_at_borders_grey_levels: MeanMax,
 }
 
 /// A claim against what was measured. Measuring samples: it can refute, not prove.
@@ -229,6 +246,10 @@ pub struct FrameRow {
     pub flip: Option<f64>,
     /// Hole pixels over all pixels.
     pub hole_fraction: Option<f64>,
+    /// Pixels whose depth is off, over all pixels.
+    pub depth_off_fraction: Option<f64>,
+    /// Change of the error since the frame before, grey levels; empty where one of the two was not read.
+    pub temporal_change_grey_levels: Option<f64>,
 }
 
 impl Times {

@@ -18,7 +18,7 @@ use crate::config::{BackendName, BudgetSettings, BuildWhen, Experiment, Pipeline
 use crate::failure::Failure;
 use crate::floor::floor;
 use crate::gallery::Gallery;
-use crate::measure::{self, EQUAL_FRAMES_NOTE, FrameErrors, Metrics, Rendered};
+use crate::measure::{self, Change, EQUAL_FRAMES_NOTE, FrameErrors, Metrics, Reads, Rendered};
 use crate::progress::Progress;
 use crate::report;
 use crate::results::{
@@ -56,8 +56,10 @@ pub struct Prepared {
     pub views: ViewModel,
     /// The path.
     pub cameras: Vec<Camera>,
-    /// Light and background.
+    /// Light and background of frame 0.
     pub shading: Shading,
+    /// How far the light turns from frame to frame, radians.
+    pub turn_rad_per_frame: f64,
     /// Each pipeline's cells.
     pub divisions: Vec<Division>,
 }
@@ -84,7 +86,9 @@ pub fn prepare(experiment: &Experiment, options: &Options<'_>) -> Result<Prepare
         p.far_field.needs(&scene, None).map_err(refused)?;
     }
     let shading = scene::shading(&experiment.light);
-    Ok(Prepared { scene, source: loaded.source, views, cameras, shading, divisions })
+    let turn_rad_per_frame =
+        f64::from(experiment.light.turn_deg_per_s).to_radians() / f64::from(experiment.view.frames_per_s);
+    Ok(Prepared { scene, source: loaded.source, views, cameras, shading, turn_rad_per_frame, divisions })
 }
 
 fn open_store(options: &Options<'_>) -> Result<Store, Failure> {
@@ -127,6 +131,11 @@ pub fn build_pipelines(
 }
 
 impl Prepared {
+    /// Light and background of a frame: the same for every pipeline.
+    pub fn lit(&self, frame: usize) -> Shading {
+        scene::turned(&self.shading, self.turn_rad_per_frame * frame as f64)
+    }
+
     /// Where things are built.
     pub fn site<'a>(
         &'a self,
@@ -257,10 +266,11 @@ impl One<'_> {
         let opened = Opened::new(self.pipeline(), division, built, &p.scene, self.site.store)?;
         let on_demand =
             (self.pipeline().build == BuildWhen::OnDemand).then(|| OnDemand::new(self.site, e.build.on_demand_ms));
+        let lit = |frame: usize| p.lit(frame);
         let tour = Tour {
             scene: &p.scene,
             views: &p.views,
-            shading: &p.shading,
+            lit: &lit,
             cameras: &p.cameras,
             frames_per_s: e.view.frames_per_s,
             measure: &e.measure,
@@ -272,6 +282,7 @@ impl One<'_> {
         let metrics = Metrics { ssim: e.measure.ssim, flip: e.measure.flip };
         let (mut walked, mut rows, mut errors): (Vec<Walked>, Vec<FrameRow>, Vec<FrameErrors>) =
             (vec![], vec![], vec![]);
+        let (reads, mut changes, mut before): (_, Vec<Change>, Option<Vec<f32>>) = (self.reads(), vec![], None);
         let bar = Progress::new(self.options.quiet).frames(name, p.cameras.len());
         let failed = |i: usize| move |f| Failure::during(format!("pipeline \"{name}\", frame {i}"), f);
         let io = |e: std::io::Error| Failure::work("the reference's pictures cannot be kept", e);
@@ -281,12 +292,23 @@ impl One<'_> {
             }
             let w = walker.step(camera).map_err(failed(i))?;
             let mut row = row(name, i, &w);
-            if i % e.measure.every == 0 {
+            if self.is_reference() && reads.iter().any(|r| r.read(i)) {
+                references.keep(i, &walker.read().map_err(failed(i))?).map_err(io)?;
+            }
+            let mine = &reads[self.index];
+            if !self.is_reference() && mine.read(i) {
                 let candidate = walker.read().map_err(failed(i))?;
-                if self.is_reference() {
-                    references.keep(i, &candidate).map_err(io)?;
-                } else {
-                    let found = measure::frame(&references.get(i).map_err(io)?, &candidate, metrics);
+                let reference = references.get(i).map_err(io)?;
+                let after = measure::error_luma(&reference.picture, &candidate.picture);
+                if let Some(before) = before.as_ref().filter(|_| mine.pair(i)) {
+                    let at_border = walked.last().is_some_and(|last| last.cell != w.cell);
+                    let grey_levels = measure::temporal_change(before, &after);
+                    row.temporal_change_grey_levels = Some(grey_levels);
+                    changes.push(Change { grey_levels, at_border });
+                }
+                before = Some(after);
+                if mine.measured(i) {
+                    let found = measure::frame(&reference, &candidate, metrics);
                     with_errors(&mut row, &found);
                     gallery.consider(name, i, i / e.measure.every, &found, candidate.picture);
                     errors.push(found);
@@ -323,14 +345,20 @@ impl One<'_> {
             resident_bytes: walked.iter().map(|w| w.resident_bytes).max().unwrap_or(0),
             frames_outside_cells: walked.iter().filter(|w| w.cell.is_none()).count(),
             original_over_simplified: MeanMax::of(ratios).mean,
-            error: (!self.is_reference()).then(|| measure::summary(&errors)),
+            error: (!self.is_reference()).then(|| measure::summary(&errors, &changes)),
             bounds: self.bounds(&measured),
             left_out,
         };
         Ok((summary, rows))
     }
 
-    /// Near triangles are the partition's to claim, holes the far field's.
+    /// Which frames each pipeline reads back; the reference those of all.
+    fn reads(&self) -> Vec<Reads> {
+        let m = &self.experiment.measure;
+        self.prepared.divisions.iter().map(|d| Reads::new(m.every, m.temporal, &d.path)).collect()
+    }
+
+    /// Near triangles are the partition's to claim, what is not seen the far field's.
     fn bounds(&self, measured: &[Measured]) -> Vec<BoundAudit> {
         let claimant = |key: &str| self.pipeline().resolved[key]["type"].as_str().unwrap_or_default().to_owned();
         let by = |near: bool| -> Vec<Measured> {
@@ -362,6 +390,7 @@ fn with_errors(row: &mut FrameRow, e: &FrameErrors) {
     row.psnr_y_db = Some(e.luminance.psnr_db());
     row.psnr_y_object_db = (e.luminance_on_objects.pixels > 0).then(|| e.luminance_on_objects.psnr_db());
     (row.ssim, row.flip, row.hole_fraction) = (e.ssim, e.flip, Some(e.hole_fraction));
+    row.depth_off_fraction = Some(e.depth_off_fraction);
 }
 
 /// `render`: one frame of one pipeline, all of it resident.
@@ -403,7 +432,7 @@ pub fn render(
     if pipeline_at.build == BuildWhen::OnDemand {
         OnDemand::new(&site, f64::INFINITY).serve(&mut opened, &camera).map_err(failed)?;
     }
-    let rendered = render_at(&opened, &mut device, &prepared, &camera).map_err(failed)?;
+    let rendered = render_at(&opened, &mut device, &prepared, &camera, &prepared.lit(number)).map_err(failed)?;
     Ok((camera, rendered))
 }
 
@@ -416,6 +445,7 @@ pub fn render_at(
     device: &mut Device,
     prepared: &Prepared,
     camera: &Camera,
+    shading: &Shading,
 ) -> Result<Rendered, farfield_core::Fault> {
     let fetch = |b| opened.fetch(b);
     for id in prepared.scene.mesh_chunk_ids() {
@@ -426,6 +456,6 @@ pub fn render_at(
         device.load(block, &prepared.scene, &fetch)?;
     }
     let drawn = opened.draws(cell, camera, &|_| true);
-    device.backend.render(&frame(camera, drawn.draws, &prepared.shading))?;
+    device.backend.render(&frame(camera, drawn.draws, shading))?;
     crate::walk::read(&mut *device.backend)
 }

@@ -6,7 +6,7 @@ use farfield_core::draw::Shading;
 use farfield_core::id::MaterialId;
 use farfield_core::mesh::TriangleMesh;
 use farfield_core::scene::{Light, LightKind, Material, Placement, Scene, SceneBuilder, Texture};
-use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 
 use crate::config::{Experiment, Generated, LightSettings, SceneSettings, Up};
 use crate::export::{Export, ExportError, export};
@@ -217,10 +217,41 @@ fn transform(p: &generate::Placement) -> DAffine3 {
     DAffine3::from_mat3_translation(DMat3::from_rotation_y(p.yaw_rad) * p.scale, p.position)
 }
 
-/// The shading that every pipeline gets.
+/// The shading that every pipeline gets at the start of the path.
 pub fn shading(l: &LightSettings) -> Shading {
     let color = Vec3::from(l.color);
     let kind = LightKind::Directional { to_light: Vec3::from(l.to_light).normalize(), angle_rad: 0.0 };
-    let lights = if color == Vec3::ZERO { vec![] } else { vec![Light { kind, color, moves: false }] };
+    let lights = if color == Vec3::ZERO { vec![] } else { vec![Light { kind, color, moves: l.turn_deg_per_s != 0.0 }] };
     Shading { ambient: Vec3::from(l.ambient), lights, sky: l.sky, ground: l.ground }
+}
+
+/// The same with its directional lights turned about the vertical, counter-clockwise seen from above.
+pub fn turned(shading: &Shading, angle_rad: f64) -> Shading {
+    let mut out = shading.clone();
+    for light in &mut out.lights {
+        if let LightKind::Directional { to_light, .. } = &mut light.kind {
+            *to_light = (DQuat::from_rotation_y(angle_rad) * to_light.as_dvec3()).as_vec3();
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turning_light_keeps_its_height_and_comes_round() {
+        let start = shading(&LightSettings { to_light: [1.0, 1.0, 0.0], ..LightSettings::default() });
+        let at = |deg: f64| match turned(&start, deg.to_radians()).lights[0].kind {
+            LightKind::Directional { to_light, .. } => to_light,
+            LightKind::Point { .. } => panic!("a point light"),
+        };
+        let s = 0.5f32.sqrt();
+        // Counter-clockwise from above leads from +x to -z.
+        for (deg, expected) in [(0.0, [s, s, 0.0]), (90.0, [0.0, s, -s]), (180.0, [-s, s, 0.0]), (360.0, [s, s, 0.0])] {
+            assert!(at(deg).distance(Vec3::from(expected)) < 1e-6, "{deg} degrees: {}", at(deg));
+        }
+        assert_eq!(turned(&start, 0.0), start);
+    }
 }

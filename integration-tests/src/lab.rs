@@ -109,7 +109,7 @@ impl Lab {
             device.load(block, &p.scene, &|b| opened.fetch(b)).map_err(|f| f.to_string())?;
         }
         let drawn = opened.draws(cell, camera, &|_| true);
-        let list = walk::frame(camera, drawn.draws, &p.shading);
+        let list = walk::frame(camera, drawn.draws, &p.lit(number));
         let counted = device.backend.render(&list).map_err(|f| f.to_string())?;
         let rendered = walk::read(&mut *device.backend).map_err(|f| f.to_string())?;
         let (near_triangles, far_triangles) = (counted.near_triangles, counted.far_triangles);

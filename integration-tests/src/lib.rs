@@ -8,3 +8,4 @@ pub mod ldi;
 pub mod pair;
 pub mod stones;
 pub mod turned;
+pub mod unseen;

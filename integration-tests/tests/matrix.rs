@@ -17,19 +17,34 @@ const GIVEN: [(&str, &str, &str); 2] = [("adaptive-grid", "budget", "6000"), ("h
 
 /// More than the defaults: partitions that make a far field do something else.
 const VARIANTS: [(&str, &str); 3] = [
-    ("octree-regions", "max_triangles = 2000, min_size = 3.0"),
-    ("octree-regions", "max_triangles = 2000, max_size = 4.0, three_dimensional = true"),
+    ("octree-regions", "max_size = 3.0, min_size = 3.0"),
+    ("octree-regions", "max_size = 4.0, three_dimensional = true"),
     ("single-cell", "region = [-8.0, 1.0, -1.0, -4.0, 2.0, 1.0]"),
 ];
 
 /// Far fields whose defaults are meant for larger pictures than these.
-const FITTED: [(&str, &str); 1] = [("textured-lod-mesh", "edge_px = 1.0")];
+const FITTED: [(&str, &str); 4] = [
+    ("incremental-tdm", "face_px = 192, sampling_px = 48"),
+    ("static-lod", "max_px = 2.0, max_albedo_off = 64"),
+    ("textured-depth-mesh", "face_px = 192"),
+    ("textured-lod-mesh", "edge_px = 1.0"),
+];
 
 /// Combinations that are refused: partition, far field, and what the refusal must say. All others have to run.
-const REFUSED: [(&str, &str, [&str; 3]); 2] = [
+const REFUSED: [(&str, &str, [&str; 3]); 4] = [
+    (
+        "{ type = \"single-cell\" }",
+        "incremental-tdm",
+        ["pipeline \"tested\"", "meets the viewpoints of cell 0", "give the partition a region"],
+    ),
     (
         "{ type = \"single-cell\" }",
         "layered-depth-image",
+        ["pipeline \"tested\"", "meets the viewpoints of cell 0", "give the partition a region"],
+    ),
+    (
+        "{ type = \"single-cell\" }",
+        "textured-depth-mesh",
         ["pipeline \"tested\"", "meets the viewpoints of cell 0", "give the partition a region"],
     ),
     (

@@ -21,7 +21,7 @@ fn walk(lab: &Lab, limit: Option<u64>, frames: usize) -> (Vec<Walked>, Rendered)
     let tour = Tour {
         scene: &p.scene,
         views: &p.views,
-        shading: &p.shading,
+        lit: &|frame| p.lit(frame),
         cameras: &cameras,
         frames_per_s: e.view.frames_per_s,
         measure: &e.measure,

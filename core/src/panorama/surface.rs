@@ -5,8 +5,9 @@
 //!
 //! - joined *side by side, directly or through another of these pixels*, so that all pixels of one surface have the same corner and share
 //!   a vertex: no seam inside a surface, across faces either. Pixels that are joined over a corner alone do not share it;
-//! - what is interpolated is 1 / depth, continued from each pixel's centre along its slope. On a plane 1 / depth is linear over the
-//!   picture, so that planes come out exactly, up to their borders.
+//! - what is interpolated is 1 / depth, continued from each pixel's centre along its slope, no further than the pixels that it is joined
+//!   with. On a plane 1 / depth is linear over the picture, so that planes come out exactly; on a silhouette, where slopes have no
+//!   bound, a surface ends at its last pixel's depth.
 //!
 //! Where two neighbouring pixels do not share their corners there is a **wall** between them, along the rays through their border, from
 //! one depth to the other: the skins of section 3.3.3 as a surface that closes the space behind which nothing is known. Seen from
@@ -43,11 +44,21 @@ struct Spot {
     reciprocal: f32,
 }
 
+/// 1 / depth around a pixel's centre.
+#[derive(Clone, Copy)]
+struct Slope {
+    /// At the centre; 0 where nothing was hit.
+    own: f32,
+    /// A pixel further along x and y.
+    step: [f32; 2],
+    /// The least and the greatest of the pixel and those that it is joined with side by side.
+    range: [f32; 2],
+}
+
 struct Build<'p, 'a> {
     p: &'p Panorama<'a>,
     joined: &'p Joined,
-    /// 1 / depth at the centre, and its slope a pixel along x and y.
-    slopes: Vec<[f32; 3]>,
+    slopes: Vec<Slope>,
     out: Surface,
 }
 
@@ -150,8 +161,8 @@ fn nearest_corner(p: &Panorama<'_>, at: Place, ray: Vec3) -> usize {
     (0..4).min_by(|&a, &b| off(a).total_cmp(&off(b))).unwrap_or_default()
 }
 
-/// 1 / depth of each pixel of a picture and its slopes: the mean of those to the joined pixels beside it, none where there are none.
-fn slopes(p: &Panorama<'_>, joined: &Joined, view: usize) -> Vec<[f32; 3]> {
+/// The slopes of a picture's pixels: the mean of those to the joined pixels beside it, none where there are none.
+fn slopes(p: &Panorama<'_>, joined: &Joined, view: usize) -> Vec<Slope> {
     let (c, image) = &p.views()[view];
     let [w, h] = c.size;
     let first = p.of_view(view).start;
@@ -159,9 +170,12 @@ fn slopes(p: &Panorama<'_>, joined: &Joined, view: usize) -> Vec<[f32; 3]> {
     let one = |i: u32| {
         let (x, y) = (i % w, i / w);
         let own = at(x, y);
-        let along = |ahead: usize, behind: usize, next: Option<(u32, u32)>, last: Option<(u32, u32)>| {
-            let to = |k: usize, n: Option<(u32, u32)>| {
-                n.filter(|_| joined.towards(first + i, k)).map(|(x, y)| at(x, y) - own)
+        let mut range = [own; 2];
+        let mut along = |ahead: usize, behind: usize, next: Option<(u32, u32)>, last: Option<(u32, u32)>| {
+            let mut to = |k: usize, n: Option<(u32, u32)>| {
+                let other = n.filter(|_| joined.towards(first + i, k)).map(|(x, y)| at(x, y))?;
+                range = [range[0].min(other), range[1].max(other)];
+                Some(other - own)
             };
             match (to(ahead, next), to(behind, last)) {
                 (Some(a), Some(b)) => 0.5 * (a - b),
@@ -172,17 +186,22 @@ fn slopes(p: &Panorama<'_>, joined: &Joined, view: usize) -> Vec<[f32; 3]> {
         };
         let gx = along(0, 4, (x + 1 < w).then(|| (x + 1, y)), (x > 0).then(|| (x - 1, y)));
         let gy = along(6, 2, (y + 1 < h).then(|| (x, y + 1)), (y > 0).then(|| (x, y - 1)));
-        [own, gx, gy]
+        // On a picture's border the surface goes on in the next one.
+        if x == 0 || y == 0 || x + 1 == w || y + 1 == h {
+            let reach = gx.abs() + gy.abs();
+            range = [(range[0] - reach).max(0.5 * own), range[1] + reach];
+        }
+        Slope { own, step: [gx, gy], range }
     };
     (0..w * h).map(one).collect()
 }
 
 impl Build<'_, '_> {
-    /// 1 / depth that a pixel has at one of its corners, no nearer than half and no farther than twice its own depth.
+    /// 1 / depth that a pixel has at one of its corners.
     fn at_corner(&self, pixel: u32, corner: usize) -> f32 {
-        let [own, gx, gy] = self.slopes[pixel as usize];
+        let Slope { own, step: [gx, gy], range: [least, most] } = self.slopes[pixel as usize];
         let (sx, sy) = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)][corner];
-        (own + sx * gx + sy * gy).clamp(0.5 * own, 2.0 * own)
+        (own + sx * gx + sy * gy).clamp(least, most)
     }
 
     /// A corner within a picture: the four pixels around it.
@@ -203,14 +222,14 @@ impl Build<'_, '_> {
         let ray = self.p.views()[view].0.ray(x as f32, y as f32);
         for g in 0..4 {
             let (mut sum, mut n) = (0.0, 0.0);
-            for i in (0..4).filter(|&i| group[i] == g && self.slopes[pixels[i] as usize][0] > 0.0) {
+            for i in (0..4).filter(|&i| group[i] == g && self.slopes[pixels[i] as usize].own > 0.0) {
                 sum += self.at_corner(pixels[i], (i + 2) % 4);
                 n += 1.0;
             }
             if n > 0.0 {
                 let vertex = self.out.points.len() as u32;
                 self.out.points.push(ray * (n / sum));
-                for i in (0..4).filter(|&i| group[i] == g && self.slopes[pixels[i] as usize][0] > 0.0) {
+                for i in (0..4).filter(|&i| group[i] == g && self.slopes[pixels[i] as usize].own > 0.0) {
                     self.out.quads[pixels[i] as usize][(i + 2) % 4] = vertex;
                 }
             }
@@ -242,7 +261,7 @@ impl Build<'_, '_> {
         let length = ray.length();
         let spots: Vec<Spot> = around
             .iter()
-            .filter(|&&a| self.slopes[a as usize][0] > 0.0)
+            .filter(|&&a| self.slopes[a as usize].own > 0.0)
             .map(|&a| {
                 let corner = nearest_corner(p, p.place(a), ray);
                 let own_ray = p.corner_ray(p.place(a), corner).length();

@@ -5,7 +5,11 @@
 //! turns the object to a random place of its picture (so the stretch towards the picture's corners is in it). A pixel is
 //! the measurement's resolution: a slit of any width may catch one row of pixel centres, so that a violation is a measured
 //! width of more than the claim plus one pixel. *Near triangles* are counted by culling, with the four side planes, every
-//! placed chunk that the view's split calls near, for views that the cell serves. Samples can refute a bound, not prove it.
+//! placed chunk that the view's split calls near, for views that the cell serves. An *unseen solid angle* is measured over the six pictures
+//! of a cube at a random viewpoint: far surfaces where the far field alone shows nothing, or something farther away (see `unseen`).
+//! Samples can refute a bound, not prove it.
+
+mod unseen;
 
 use std::collections::BTreeMap;
 
@@ -78,7 +82,8 @@ impl Measured {
 fn resolution(q: Quantity) -> f64 {
     match q {
         Quantity::HoleWidthPx => 1.0,
-        Quantity::NearTriangles | Quantity::UnseenSolidAngle => 0.0,
+        Quantity::NearTriangles => 0.0,
+        Quantity::UnseenSolidAngle => unseen::RESOLUTION_SR,
     }
 }
 
@@ -89,7 +94,9 @@ impl CellAudit<'_> {
     /// What the backend gives.
     pub fn sample(&self, backend: &mut dyn Backend, n: usize, seed: u64) -> Result<Vec<Measured>, Fault> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ u64::from(self.cell.outline.id.0).rotate_left(32));
-        let whole = self.cell.claims.iter().filter(|c| c.payload.is_none());
+        // Of a cell as a whole the far field's unseen surfaces are measured; its holes are measured object by object.
+        let own = self.claims.iter().filter(|c| c.quantity == Quantity::UnseenSolidAngle);
+        let whole = self.cell.claims.iter().chain(own).filter(|c| c.payload.is_none());
         let mut questions: Vec<(Quantity, f64, Option<Object>)> = whole.map(|c| (c.quantity, c.max, None)).collect();
         questions.extend(self.objects().into_iter().map(|o| (Quantity::HoleWidthPx, o.claimed, Some(o))));
         let mut out = vec![];
@@ -98,7 +105,8 @@ impl CellAudit<'_> {
             let measured = match (quantity, object) {
                 (Quantity::NearTriangles, _) => self.near_triangles(&mut rng),
                 (Quantity::HoleWidthPx, Some(object)) => self.hole_width(backend, object, &mut rng)?,
-                (Quantity::HoleWidthPx, None) | (Quantity::UnseenSolidAngle, _) => None,
+                (Quantity::HoleWidthPx, None) => None,
+                (Quantity::UnseenSolidAngle, _) => self.unseen_solid_angle(backend, &mut rng)?,
             };
             out.extend(measured.map(|measured| Measured { quantity: *quantity, claimed: *claimed, measured }));
         }
@@ -233,7 +241,11 @@ pub fn join(claimant: &str, measured: &[Measured]) -> Vec<BoundAudit> {
                     Quantity::HoleWidthPx => {
                         "a sample violates its own claim when it exceeds it by more than one pixel".into()
                     }
-                    Quantity::NearTriangles | Quantity::UnseenSolidAngle => String::new(),
+                    Quantity::NearTriangles => String::new(),
+                    Quantity::UnseenSolidAngle => format!(
+                        "counted by pixels of cubes of {} px a face: a sample violates its claim by more than one of them",
+                        unseen::FACE_PX
+                    ),
                 },
             }
         })

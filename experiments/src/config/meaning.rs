@@ -12,7 +12,8 @@ use crate::generate::{HOUSE_EYE, PLANT_EYE, gallery_height};
 use crate::path::{PATHS, ROUTE};
 
 /// How a scene is named.
-pub(super) const SCENE_HELP: &str = "source = \"house\", \"park\", \"pipes\" or \"plant\" generates a scene, path = \"model.glb\" loads one";
+pub(super) const SCENE_HELP: &str =
+    "source = \"house\", \"park\", \"pipes\" or \"plant\" generates a scene, path = \"model.glb\" loads one";
 
 /// Checks, and makes paths absolute and the reference explicit.
 pub(super) fn check(
@@ -126,7 +127,8 @@ fn view(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes:
             let help = format!("paths: {}, or a .csv of key frames", PATHS.join(", "));
             mistakes.add(&at(root, "view", "path"), format!("no path is called \"{path}\""), "unknown", Some(help));
         } else if path == ROUTE && source.is_some_and(|s| !s.0.is_some_and(Generated::has_route)) {
-            let help = "a house and a plant bring a route along; elsewhere a .csv of key frames says where to go".to_owned();
+            let help =
+                "a house and a plant bring a route along; elsewhere a .csv of key frames says where to go".to_owned();
             mistakes.add(&at(root, "view", "path"), "the scene brings no route along", "no route", Some(help));
         }
     }

@@ -181,6 +181,10 @@ pub struct LightSettings {
     pub sky: [u8; 3],
     /// Background below the horizon, sRGB 0 to 255.
     pub ground: [u8; 3],
+    /// How fast the light turns about the vertical while the path is walked, counter-clockwise seen from above; frame 0 is lit
+    /// from `to_light`.
+    #[schemars(extend("unit" = "degrees/s"))]
+    pub turn_deg_per_s: f32,
 }
 
 impl Default for LightSettings {
@@ -191,6 +195,7 @@ impl Default for LightSettings {
             ambient: [0.25; 3],
             sky: [150, 185, 225],
             ground: [86, 112, 68],
+            turn_deg_per_s: 0.0,
         }
     }
 }
@@ -223,6 +228,9 @@ pub struct MeasureSettings {
     /// Pictures of every n-th frame are compared with the reference.
     #[schemars(range(min = 1), extend("unit" = "frames"))]
     pub every: usize,
+    /// Change from frame to frame: the frame before each measured one is read too, and the two on both sides of every border between
+    /// cells. Without it, changes are measured only where `every` = 1.
+    pub temporal: bool,
     /// Structural similarity.
     pub ssim: bool,
     /// FLIP.
@@ -241,7 +249,7 @@ pub struct MeasureSettings {
 
 impl Default for MeasureSettings {
     fn default() -> Self {
-        Self { every: 4, ssim: true, flip: true, audit_views: 64, pictures: 2, warm_up: 1, repeats: 1 }
+        Self { every: 4, temporal: true, ssim: true, flip: true, audit_views: 64, pictures: 2, warm_up: 1, repeats: 1 }
     }
 }
 

@@ -27,7 +27,8 @@ impl Solid {
         let inner = half - round;
         let last = 2 * n + 1;
         // Grid lines 0..=n lie on the lower rounding, n + 1..=last on the upper one.
-        let line = |i: u32| if i <= n { (-1.0, i as f32 / n as f32 - 1.0) } else { (1.0, (i - n - 1) as f32 / n as f32) };
+        let line =
+            |i: u32| if i <= n { (-1.0, i as f32 / n as f32 - 1.0) } else { (1.0, (i - n - 1) as f32 / n as f32) };
         // tan keeps the chords of a round nearly equal.
         let bow = |t: f32| (t * std::f32::consts::FRAC_PI_4).tan();
         self.gridded(frame, last, paint, |at| {
@@ -137,7 +138,14 @@ impl Solid {
 
     /// The upright prism over a polygon of (x, z) that is counter-clockwise seen from above and star-shaped about `centre`,
     /// from `low` to `high`: 4 triangles a corner. Sides with less than 35 degrees between them are shaded smoothly.
-    pub(super) fn prism(&mut self, frame: Affine3A, outline: &[Vec2], centre: Vec2, [low, high]: [f32; 2], paint: Paint) {
+    pub(super) fn prism(
+        &mut self,
+        frame: Affine3A,
+        outline: &[Vec2],
+        centre: Vec2,
+        [low, high]: [f32; 2],
+        paint: Paint,
+    ) {
         let n = outline.len();
         let at = |p: Vec2, y: f32| frame.transform_point3(Vec3::new(p.x, y, p.y));
         let direction = |v: Vec3| frame.transform_vector3(v).normalize();
@@ -151,8 +159,8 @@ impl Solid {
             let soft = |a: Vec3| if a.dot(own) > super::solid::CREASE_COS { (a + own).normalize() } else { own };
             let (a, b) = (outline[i], outline[(i + 1) % n]);
             let (na, nb) = (direction(soft(before)), direction(soft(after)));
-            let [a0, b0, b1, a1] =
-                [(a, low, na), (b, low, nb), (b, high, nb), (a, high, na)].map(|(p, y, n)| self.vertex(at(p, y), n, paint));
+            let [a0, b0, b1, a1] = [(a, low, na), (b, low, nb), (b, high, nb), (a, high, na)]
+                .map(|(p, y, n)| self.vertex(at(p, y), n, paint));
             self.mesh.indices.extend([a0, b0, b1, a0, b1, a1]);
         }
         for (y, up) in [(low, false), (high, true)] {
@@ -222,7 +230,8 @@ mod tests {
         near(volume(|s| s.rounded(turned, half, 0.0, 0, PAINT)), 1.92, 1e-4);
         near(volume(|s| s.rounded(turned, half, 0.4, 6, PAINT)), 1.92, 0.15);
         near(volume(|s| s.ball(turned, 16, PAINT, |_| 0.5)), 4.0 / 3.0 * std::f64::consts::PI * 0.125, 0.02);
-        let arc: Vec<Vec3> = (0..=32).map(|i| Vec3::new((i as f32 * 0.05).sin(), (i as f32 * 0.05).cos(), 0.0)).collect();
+        let arc: Vec<Vec3> =
+            (0..=32).map(|i| Vec3::new((i as f32 * 0.05).sin(), (i as f32 * 0.05).cos(), 0.0)).collect();
         near(volume(|s| s.sweep(&arc, 24, PAINT, |_| 0.1)), 1.6 * std::f64::consts::PI * 0.01, 0.02);
         let square = [(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)].map(|(x, z)| Vec2::new(x, z));
         near(volume(|s| s.prism(turned, &square, Vec2::ZERO, [0.0, 0.5], PAINT)), 2.0, 1e-4);

@@ -2,13 +2,19 @@
 //!
 //! PSNR is on luminance (textured LOD meshes, 2003, section 4.2), over the frame and over object pixels; SSIM and FLIP come
 //! from libraries that follow their papers; a hole is a pixel where the reference shows an object and the candidate shows
-//! the background. O(pixels).
+//! the background; depths are compared too, and errors from frame to frame. O(pixels).
 
+mod depth;
 mod holes;
 mod psnr;
+mod solid_angle;
+mod temporal;
 
+pub use depth::{DEPTH_OFF, depth_off_fraction};
 pub use holes::{hole_mask, hole_width_px};
 pub use psnr::{SquaredError, cap_db};
+pub(crate) use solid_angle::pixel_solid_angle;
+pub use temporal::{Change, Reads, error_luma, temporal_change};
 
 use farfield_core::image::{Picture, SurfaceImage};
 use image::GrayImage;
@@ -46,6 +52,8 @@ pub struct FrameErrors {
     pub flip: Option<f64>,
     /// Hole pixels over all pixels.
     pub hole_fraction: f64,
+    /// Pixels whose depth is off by more than 1 %, or where only one of the two shows a surface, over all pixels.
+    pub depth_off_fraction: f64,
 }
 
 /// Says in words how equal frames enter a mean.
@@ -77,11 +85,12 @@ pub fn frame(reference: &Rendered, candidate: &Rendered, metrics: Metrics) -> Fr
         ssim: metrics.ssim.then(|| ssim(&reference.picture, &candidate.picture)),
         flip: metrics.flip.then(|| flip(&reference.picture, &candidate.picture).0),
         hole_fraction: holes as f64 / reference.picture.rgba.len().max(1) as f64,
+        depth_off_fraction: depth_off_fraction(&reference.surface, &candidate.surface),
     }
 }
 
-/// Joins frames into a summary.
-pub fn summary(frames: &[FrameErrors]) -> ErrorSummary {
+/// Joins measured frames, and changes between frames, into a summary.
+pub fn summary(frames: &[FrameErrors], changes: &[Change]) -> ErrorSummary {
     let pooled = frames.iter().fold(SquaredError::default(), |s, f| s.joined(f.luminance));
     let of = |pick: fn(&FrameErrors) -> Option<f64>| -> Option<Vec<f64>> { frames.iter().map(pick).collect() };
     ErrorSummary {
@@ -95,6 +104,13 @@ pub fn summary(frames: &[FrameErrors]) -> ErrorSummary {
         ssim: of(|f| f.ssim).filter(|v| !v.is_empty()).map(MeanMin::of),
         flip: of(|f| f.flip).filter(|v| !v.is_empty()).map(MeanMax::of),
         hole_fraction: MeanMax::of(frames.iter().map(|f| f.hole_fraction)),
+        depth_off_fraction: MeanMax::of(frames.iter().map(|f| f.depth_off_fraction)),
+        frame_pairs: changes.len(),
+        temporal_change_grey_levels: MeanMax::of(changes.iter().map(|c| c.grey_levels)),
+        frame_pairs_at_borders: changes.iter().filter(|c| c.at_border).count(),
+        temporal_change_at_borders_grey_levels: MeanMax::of(
+            changes.iter().filter(|c| c.at_border).map(|c| c.grey_levels),
+        ),
     }
 }
 
@@ -138,6 +154,7 @@ mod tests {
             surface: SurfaceImage {
                 size,
                 object: (0..1024).map(at).map(|(x, y)| u32::from(hit(x, y))).collect(),
+                depth: (0..1024).map(at).map(|(x, y)| if hit(x, y) { 3.0 } else { f32::INFINITY }).collect(),
                 ..Default::default()
             },
         }
@@ -148,8 +165,8 @@ mod tests {
     fn equal_frames_are_perfect_and_enter_at_the_cap() {
         let a = rendered(|x, y| (x * 7 + y) as u8, |x, _| x < 16);
         let e = frame(&a, &a, ALL);
-        assert_eq!((e.ssim, e.flip, e.hole_fraction), (Some(1.0), Some(0.0), 0.0));
-        let s = summary(&[e, e]);
+        assert_eq!((e.ssim, e.flip, e.hole_fraction, e.depth_off_fraction), (Some(1.0), Some(0.0), 0.0, 0.0));
+        let s = summary(&[e, e], &[]);
         assert_eq!(s.equal_frames, 2);
         assert!((s.psnr_y_db.mean - 10.0 * (255.0f64 * 255.0 * 1024.0).log10()).abs() < 1e-9);
     }
@@ -160,8 +177,17 @@ mod tests {
         let e = frame(&a, &b, ALL);
         assert!((e.luminance.psnr_db() - 10.0 * (255.0f64 * 255.0 / 100.0).log10()).abs() < 1e-3);
         assert_eq!(e.luminance_on_objects.pixels, 8 * 32);
-        assert_eq!(e.hole_fraction, 0.25);
+        assert_eq!((e.hole_fraction, e.depth_off_fraction), (0.25, 0.25));
         assert!(e.flip.unwrap() > 0.0 && e.ssim.unwrap() < 1.0);
+    }
+
+    #[test]
+    fn changes_at_borders_are_told_apart() {
+        let change = |grey_levels: f64, at_border: bool| Change { grey_levels, at_border };
+        let s = summary(&[], &[change(1.0, false), change(5.0, true), change(3.0, true), change(1.0, false)]);
+        assert_eq!((s.frame_pairs, s.frame_pairs_at_borders), (4, 2));
+        assert_eq!(s.temporal_change_grey_levels, MeanMax { mean: 2.5, max: 5.0 });
+        assert_eq!(s.temporal_change_at_borders_grey_levels, MeanMax { mean: 4.0, max: 5.0 });
     }
 
     #[test]

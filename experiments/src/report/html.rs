@@ -37,6 +37,12 @@ pub(super) fn row(name: &str, p: &PipelineSummary) -> Vec<String> {
         or_dash(e.and_then(|e| e.ssim).map(|s| format!("{:.4}", s.mean))),
         or_dash(e.and_then(|e| e.flip).map(|f| format!("{:.4}", f.mean))),
         or_dash(e.map(|e| format!("{:.4}", 100.0 * e.hole_fraction.mean))),
+        or_dash(e.map(|e| format!("{:.4}", 100.0 * e.depth_off_fraction.mean))),
+        or_dash(e.filter(|e| e.frame_pairs > 0).map(|e| format!("{:.3}", e.temporal_change_grey_levels.mean))),
+        or_dash(
+            e.filter(|e| e.frame_pairs_at_borders > 0)
+                .map(|e| format!("{:.3}", e.temporal_change_at_borders_grey_levels.mean)),
+        ),
         format!("{:.1}", p.preprocess.bytes_stored as f64 / 1e6),
     ]
 }
@@ -79,6 +85,7 @@ pub(super) fn run(s: &Summary, frames: &[FrameRow], gallery: &[Shown]) -> io::Re
     details(&mut h, s);
     h += "<h2>Frame by frame</h2>";
     h += &by_frame("PSNR-Y, dB", &series(frames, |r| r.psnr_y_db))?;
+    h += &by_frame("change since the frame before, grey levels", &series(frames, |r| r.temporal_change_grey_levels))?;
     h += &by_frame("frame time, ms", &series(frames, |r| Some(r.frame_ms)))?;
     h += &by_frame("triangles", &series(frames, |r| Some((r.near_triangles + r.far_triangles) as f64)))?;
     if !gallery.is_empty() {

@@ -69,7 +69,7 @@ pub fn table(runs: &[(String, Summary)]) -> String {
 }
 
 /// The columns of [`table`] and of the report's first table.
-const COLUMNS: [&str; 15] = [
+const COLUMNS: [&str; 18] = [
     "pipeline",
     "frame ms",
     "p95 ms",
@@ -84,6 +84,9 @@ const COLUMNS: [&str; 15] = [
     "SSIM",
     "FLIP",
     "holes %",
+    "depth off %",
+    "change",
+    "at borders",
     "built MB",
 ];
 

@@ -36,8 +36,8 @@ pub struct Tour<'a> {
     pub scene: &'a Scene,
     /// The views.
     pub views: &'a ViewModel,
-    /// Light and background.
-    pub shading: &'a Shading,
+    /// Light and background of a frame.
+    pub lit: &'a dyn Fn(usize) -> Shading,
     /// The path.
     pub cameras: &'a [Camera],
     /// Frames a second of the path.
@@ -164,7 +164,8 @@ impl<'a> Walker<'a> {
         let uploaded_bytes = self.load(camera, cell)?;
         let residency = &self.residency;
         let drawn = self.opened.draws(cell, camera, &|b| residency.has(b));
-        let list = frame(camera, drawn.draws, self.tour.shading);
+        // `load` has counted this frame already.
+        let list = frame(camera, drawn.draws, &(self.tour.lit)(self.frames - 1));
         let warm_up = if self.frames == 1 { self.tour.measure.warm_up } else { 0 };
         for _ in 0..warm_up {
             self.device.backend.render(&list)?;

@@ -153,9 +153,10 @@ fn cube(
     let patches = patches(&cameras, mesh);
     let sizes: Vec<[u32; 2]> = patches.iter().map(|p| [p.rect[2], p.rect[3]]).collect();
     let packing = pack(&[sizes], making.atlas_px, u32::MAX)?;
-    let (side, layers) = packing.atlases[0];
-    let mut atlas = blank(side, layers);
     let slots = &packing.slots[0];
+    // No larger than what is used of it.
+    let used = |k: usize| slots.iter().map(|s| s.rect[k] + s.rect[k + 2]).max().unwrap_or(1);
+    let mut atlas = blank([used(0), used(1)], packing.atlases[0].1);
     patches.iter().zip(slots).for_each(|(patch, slot)| write(&mut atlas, slot, &p.views()[patch.view].1, patch));
     let texels = patches.iter().map(|p| u64::from(p.rect[2]) * u64::from(p.rect[3])).sum();
     let mut parts = vec![Part::Atlas(atlas)];

@@ -32,6 +32,7 @@ mod view;
 
 use farfield_core::Fault;
 use farfield_core::cell::Cell;
+use farfield_core::claim::{Claim, Quantity};
 use farfield_core::context::Context;
 use farfield_core::id::AssetId;
 use farfield_core::panorama::SkinTests;
@@ -273,14 +274,22 @@ impl FarField for IncrementalTdm {
             max_samples: self.max_samples as usize,
             face_px: self.sampling_px,
         };
+        let mut unseen = None;
         for (i, split) in job.cell.splits.iter().enumerate().filter(|(_, s)| !s.far.is_empty()) {
             let chosen = choose(&sampling, job, &split.far, cx)?;
+            if chosen.verdict.quantity == Quantity::UnseenSolidAngle {
+                unseen = Some(chosen.verdict.claim.max(unseen.unwrap_or(0.0)));
+            }
             if !chosen.verdict.passes && chosen.eyes.len() >= self.max_samples as usize {
                 let (n, v) = (chosen.eyes.len(), chosen.verdict);
                 let reason = format!("max_samples = {n} leaves {} = {:.3}", v.quantity.name(), v.value);
                 out.left_out(LeftOut { stage: "samples".into(), reason, decided: "build".into() });
             }
             bake(&making, job, (i as u32, &split.far), &chosen.eyes, &mut index, out, cx)?;
+        }
+        // A budget may leave out what was sampled.
+        if let Some(max) = unseen.filter(|_| self.scan_budget.is_none() && self.triangle_budget.is_none()) {
+            out.claim(Claim { quantity: Quantity::UnseenSolidAngle, payload: None, max });
         }
         index.encode()
     }

@@ -14,12 +14,12 @@ use farfield_core::payload::AtlasPart;
 
 use crate::simplify::Simplified;
 
-/// Texels around a triangle's rectangle: look-ups reach half a texel, corners may have moved by half a pixel.
-const MARGIN: u32 = 2;
+/// Texels around a triangle's rectangle: look-ups reach half a texel, and corners may have moved by half a pixel.
+const MARGIN: u32 = 1;
 /// The smallest node's side, pixels: smaller rectangles cost more in margins and projectors than they save.
-const SMALLEST: u32 = 16;
+const SMALLEST: u32 = 8;
 /// A node becomes one rectangle when that has at most so many times the texels of its parts.
-const JOIN: f32 = 1.3;
+const JOIN: f32 = 1.15;
 
 /// A rectangle of a picture with the triangles that it textures.
 #[derive(Clone, Debug, PartialEq)]

@@ -40,7 +40,7 @@ pub(crate) fn bake(
     let atlas_id = |a: u32| LocalPayload(work.len() as u32 + a);
     for (a, &(side, layers)) in packing.atlases.iter().enumerate() {
         cx.check()?;
-        let mut part = blank(side, layers);
+        let mut part = blank([side; 2], layers);
         let mut bounds = Aabb::EMPTY;
         for (i, slots) in packing.slots.iter().enumerate() {
             let Some(b) = baked[i].as_mut().filter(|_| slots.first().is_some_and(|s| s.atlas as usize == a)) else {

@@ -92,7 +92,8 @@ fn fence(m: &mut Model) {
         let white = [238, 234, 224];
         for k in 0..14 {
             let x = -0.93 + 0.143 * k as f32;
-            let outline = [(0.035, 0.012), (0.035, -0.012), (-0.035, -0.012), (-0.035, 0.012)].map(|(x, z)| Vec2::new(x, z));
+            let outline =
+                [(0.035, 0.012), (0.035, -0.012), (-0.035, -0.012), (-0.035, 0.012)].map(|(x, z)| Vec2::new(x, z));
             s.prism(to(x, 0.0, 0.0), &outline, Vec2::ZERO, [0.08, 0.92 + 0.03 * (k % 2) as f32], white);
         }
         for y in [0.3, 0.72] {
@@ -158,7 +159,8 @@ pub(super) fn garden() -> Vec<Thing> {
         at: vec![DAffine3::IDENTITY],
     });
     let (w, d, r) = (f64::from(SIZE.x), f64::from(SIZE.y), f64::from(REACH));
-    let length = |from: f64, to: f64, n: i32| (0..n).map(move |k| from + (to - from) * (f64::from(k) + 0.5) / f64::from(n));
+    let length =
+        |from: f64, to: f64, n: i32| (0..n).map(move |k| from + (to - from) * (f64::from(k) + 0.5) / f64::from(n));
     let mut hedges: Vec<DAffine3> = length(-r, w + r, 6).map(|x| on_ground(x, -r + 0.6, 0.0)).collect();
     hedges.extend(length(-r, d + r, 5).map(|z| on_ground(-r + 0.6, z, 90.0)));
     hedges.extend(length(-r, w + r, 6).map(|x| on_ground(x, d + r - 0.6, 180.0)));
@@ -190,7 +192,8 @@ pub(super) fn garden() -> Vec<Thing> {
     let up = 0.04;
     let place = |x: f64, z: f64, yaw: f64| put(x, f64::from(GROUND) + up, z, yaw);
     out.push(thing("garden table", vec![place(6.2, 13.2, 0.0)], move |m| table(m, 1.4, 0.9, white)));
-    let chairs = vec![place(5.75, 12.55, 5.0), place(6.6, 12.5, -4.0), place(5.8, 13.95, 182.0), place(7.3, 13.3, -80.0)];
+    let chairs =
+        vec![place(5.75, 12.55, 5.0), place(6.6, 12.5, -4.0), place(5.8, 13.95, 182.0), place(7.3, 13.3, -80.0)];
     out.push(thing("garden chair", chairs, move |m| chair(m, white, [92, 140, 120])));
     out.push(thing("parasol", vec![place(4.6, 14.4, 0.0)], parasol));
     let spot = |k: i32| {

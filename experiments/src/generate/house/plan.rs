@@ -41,16 +41,8 @@ pub(super) enum Room {
 
 impl Room {
     /// All.
-    pub(super) const ALL: [Room; 8] = [
-        Room::Kitchen,
-        Room::Bath,
-        Room::Bedroom,
-        Room::Nursery,
-        Room::Hall,
-        Room::Living,
-        Room::Study,
-        Room::Music,
-    ];
+    pub(super) const ALL: [Room; 8] =
+        [Room::Kitchen, Room::Bath, Room::Bedroom, Room::Nursery, Room::Hall, Room::Living, Room::Study, Room::Music];
 
     /// Lowest and highest (x, z), to the walls' middle lines.
     pub(super) fn extent(self) -> [Vec2; 2] {

@@ -125,9 +125,8 @@ fn wall_faces(s: &mut Solid, wall: &Wall, heights: &[f32], step: f32, room: Opti
     let marks = wall.openings.iter().flat_map(|o| o.span).chain(crossings(wall));
     let along = cuts(wall.span, marks, step);
     let half = 0.5 * wall.thick;
-    let hole = |u: f32, v: f32| {
-        wall.openings.iter().any(|o| o.span[0] < u && u < o.span[1] && o.rise[0] < v && v < o.rise[1])
-    };
+    let hole =
+        |u: f32, v: f32| wall.openings.iter().any(|o| o.span[0] < u && u < o.span[1] && o.rise[0] < v && v < o.rise[1]);
     // The floor of a door's opening is the room's; walls run on below it.
     let seen = |p: Vec3| Room::at(Vec2::new(p.x, p.z)) == room;
     let (axis, across) = if wall.along_x { (Vec3::X, Vec3::Z) } else { (Vec3::Z, Vec3::X) };
@@ -237,7 +236,13 @@ fn skirting(s: &mut Solid, room: Room) {
     for wall in walls() {
         let k = usize::from(!wall.along_x);
         let other = 1 - k;
-        let side = if wall.line == a[other] { 1.0 } else if wall.line == b[other] { -1.0 } else { continue };
+        let side = if wall.line == a[other] {
+            1.0
+        } else if wall.line == b[other] {
+            -1.0
+        } else {
+            continue;
+        };
         // Boards along z stop at those along x.
         let rim = if wall.along_x { 0.0 } else { t };
         let ends = [low[k] + rim, high[k] - rim];
@@ -249,7 +254,8 @@ fn skirting(s: &mut Solid, room: Room) {
             let to = (d[0] - FRAME).min(ends[1]);
             let middle = wall.point(0.5 * (from + to), 0.5 * h - 0.005, side * 0.5 * (wall.thick + t));
             let along = 0.5 * (to - from);
-            let half = if wall.along_x { Vec3::new(along, 0.5 * h, 0.5 * t) } else { Vec3::new(0.5 * t, 0.5 * h, along) };
+            let half =
+                if wall.along_x { Vec3::new(along, 0.5 * h, 0.5 * t) } else { Vec3::new(0.5 * t, 0.5 * h, along) };
             s.block(Affine3A::from_translation(middle), half, WHITE);
             from = d[1] + FRAME;
         }

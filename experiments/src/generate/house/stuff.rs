@@ -143,7 +143,13 @@ impl Model {
         for t in source.indices.chunks_exact(3) {
             let [a, b, c] = [0, 1, 2].map(|k| source.positions[t[k] as usize]);
             let n = (b - a).cross(c - a).abs();
-            let axis = if n.y >= n.x && n.y >= n.z { 1 } else if n.x > n.z { 0 } else { 2 };
+            let axis = if n.y >= n.x && n.y >= n.z {
+                1
+            } else if n.x > n.z {
+                0
+            } else {
+                2
+            };
             for &i in t {
                 let p = source.positions[i as usize];
                 let uv = match axis {
@@ -166,7 +172,8 @@ impl Model {
         let mut solid = Solid::default();
         make(&mut solid);
         let source = &solid.mesh;
-        let (min, max) = source.positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |b, &p| (b.0.min(p), b.1.max(p)));
+        let (min, max) =
+            source.positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |b, &p| (b.0.min(p), b.1.max(p)));
         let (base, first) = (self.mesh.positions.len() as u32, self.mesh.indices.len() as u32);
         for (i, &p) in source.positions.iter().enumerate() {
             let f = (p - min) / (max - min);

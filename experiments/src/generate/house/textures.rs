@@ -233,9 +233,14 @@ fn painting(f: Vec2, i: i32, seed: u32) -> Vec3 {
     c = c.lerp(Vec3::new(1.0, 0.95, 0.8), smooth(0.085, 0.07, f.distance(sun)));
     for k in 0..4 {
         let rise = 0.42 + 0.13 * k as f32;
-        let ridge = rise + 0.22 * (cloud(Vec2::new(f.x * 0.9, 0.1 * k as f32), [4, 4], 3, seed + (i * 7 + k) as u32) - 0.5);
-        let ground = Vec3::new(0.45, 0.5, 0.55).lerp(Vec3::new(0.14, 0.22, 0.10), k as f32 / 3.0).lerp(hue(20 + 3 * k), 0.3);
-        c = c.lerp(ground * (0.8 + 0.4 * cloud(f, [24, 8], 2, seed + k as u32)), smooth(ridge - 0.004, ridge + 0.004, f.y));
+        let ridge =
+            rise + 0.22 * (cloud(Vec2::new(f.x * 0.9, 0.1 * k as f32), [4, 4], 3, seed + (i * 7 + k) as u32) - 0.5);
+        let ground =
+            Vec3::new(0.45, 0.5, 0.55).lerp(Vec3::new(0.14, 0.22, 0.10), k as f32 / 3.0).lerp(hue(20 + 3 * k), 0.3);
+        c = c.lerp(
+            ground * (0.8 + 0.4 * cloud(f, [24, 8], 2, seed + k as u32)),
+            smooth(ridge - 0.004, ridge + 0.004, f.y),
+        );
     }
     c * (0.9 + 0.2 * cloud(f, [40, 64], 2, seed + i as u32))
 }

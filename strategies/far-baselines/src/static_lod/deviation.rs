@@ -12,9 +12,9 @@
 //! edge: bounding it the same way would cost the level's area over its squared error.
 //!
 //! **Colour.** A level has colours at its vertices only. Where the original's albedo (its texture included) and the level's at the
-//! nearest point differ by more than a setting in some channel, the right colour is at the level's vertices, which
-//! lie at most the longest edge of the triangle away: that length counts as the deviation there. Sampled at the original's
-//! vertices and on a lattice inside its textured triangles.
+//! nearest point differ by more than a setting in some channel, colours are right again at the level's vertices: the distance to the
+//! nearest corner of that triangle counts as the deviation there. Sampled at the original's vertices and on a lattice inside its
+//! textured triangles.
 //!
 //! O((n + m) log m) for n original triangles and m of the level.
 
@@ -102,7 +102,7 @@ impl<'a> Original<'a> {
                 let seen = target.albedo(&m);
                 let off = |w: &u32| difference(self.source.wedges[*w as usize].albedo, seen);
                 if wedges.iter().map(off).min() > Some(max_off) {
-                    colour = colour.max(longest_edge(self.source.places(level[m.triangle as usize])));
+                    colour = colour.max(target.to_corner(&m));
                 }
             }
         }
@@ -153,7 +153,7 @@ impl<'a> Original<'a> {
         most
     }
 
-    /// What a textured triangle adds: the longest edge of the level's triangles where its colours are missed.
+    /// What a textured triangle adds: how far the level's vertices are where its colours are missed.
     fn texture(&self, target: &Target<'_>, t: &Textured, max_off: u8) -> f32 {
         let p = self.source.places(self.source.corners[t.triangle as usize]);
         let Some(texture) = self.textures.get(t.texture as usize) else { return 0.0 };
@@ -164,7 +164,7 @@ impl<'a> Original<'a> {
             let [r, g, b] = (mix(t.tint) * texture_at(texture, uv)).to_array().map(byte_of_linear);
             let Some(m) = target.nearest(mix(p)) else { continue };
             if difference([r, g, b, 255], target.albedo(&m)) > max_off {
-                most = most.max(longest_edge(self.source.places(target.corners[m.triangle as usize])));
+                most = most.max(target.to_corner(&m));
             }
         }
         most
@@ -175,6 +175,12 @@ impl Target<'_> {
     fn nearest(&self, point: Vec3) -> Option<Met> {
         let n = self.bvh.closest_point(point, f32::INFINITY)?;
         Some(Met { point, triangle: n.triangle, distance: n.distance, weights: n.weights })
+    }
+
+    /// How far a point is from the nearest corner of its triangle.
+    fn to_corner(&self, m: &Met) -> f32 {
+        let p = self.source.places(self.corners[m.triangle as usize]);
+        p.iter().map(|c| c.distance(m.point)).fold(f32::INFINITY, f32::min)
     }
 
     /// No point between three is farther from the level than this.

@@ -1,11 +1,14 @@
 //! The levels of one object: collapsed one after the other, each with how far it is off.
 //!
 //! The edge collapse of Garland and Heckbert (1997) on the welded vertices, survivors on original places; the quadrics go on from
-//! level to level, so a level is what one long collapse would leave. A corner whose vertex died takes the survivor's wedge that
+//! level to level, so a level is what one long collapse would leave. Colours enter the cost beside the planes, as an edge's length times the
+//! difference of its ends' albedo (simpler than the quadrics over attributes of Garland and Heckbert 1998: nothing is remembered). A corner whose vertex died takes the survivor's wedge that
 //! looks most like its own: corners stay on their side of a seam. O(n log n).
 
 use farfield_core::Fault;
-use farfield_core::collapse::{LiveMesh, Placement, QuadricSettings, Quadrics, Settings, collapse};
+use farfield_core::collapse::{
+    Candidate, Cost, LiveMesh, Place, Placement, QuadricSettings, Quadrics, Settings, collapse,
+};
 use farfield_core::context::Context;
 use farfield_core::payload::MeshPart;
 use farfield_core::scene::Texture;
@@ -49,7 +52,11 @@ pub(super) fn levels(
         let indices: Vec<u32> = corners.iter().flat_map(|&c| source.vertices(c)).collect();
         let live = LiveMesh::new(&source.positions, &indices, &[])?;
         let half_edge = QuadricSettings { placement: Placement::HalfEdge, ..QuadricSettings::default() };
-        let cost = quadrics.get_or_insert_with(|| Quadrics::new(&live, half_edge));
+        let cost = quadrics.get_or_insert_with(|| Coloured {
+            quadrics: Quadrics::new(&live, half_edge),
+            source,
+            wedges: &wedges,
+        });
         // Small closed parts may vanish, as they have to in scenes of many; a survivor on an original place opens no surface.
         let settings = Settings { min_triangles: target(corners.len()), link_condition: false, ..Settings::default() };
         let left = collapse(live, cost, &settings);
@@ -77,6 +84,46 @@ pub(super) fn levels(
     Ok(out)
 }
 
+/// How much of its length an edge from black to white costs: a wrong colour over a length weighs as the surface half as far off.
+const COLOUR_WEIGHT: f32 = 0.5;
+
+/// cost = sqrt(quadric error^2 + (COLOUR_WEIGHT |albedo difference| length)^2), scene units; albedo 0..1, display space. The difference is that
+/// between a dying vertex's wedges and the survivor's most like them; of several wedges the worst served counts.
+struct Coloured<'a> {
+    quadrics: Quadrics,
+    source: &'a Source,
+    wedges: &'a [Vec<u32>],
+}
+
+impl Coloured<'_> {
+    fn off(&self, dying: u32, onto: u32) -> f32 {
+        let albedo = |w: &u32| unit(self.source.wedges[*w as usize].albedo);
+        let least = |w: &u32| {
+            let all = self.wedges[onto as usize].iter().map(|o| albedo(o).distance(albedo(w)));
+            all.fold(f32::INFINITY, f32::min)
+        };
+        self.wedges[dying as usize].iter().map(least).fold(0.0, f32::max)
+    }
+}
+
+impl Cost for Coloured<'_> {
+    fn costs(&mut self, mesh: &LiveMesh, edges: &[[u32; 2]], out: &mut [Candidate]) {
+        self.quadrics.costs(mesh, edges, out);
+        for (&[a, b], out) in edges.iter().zip(out) {
+            let off = if matches!(out.place, Place::Second) { self.off(a, b) } else { self.off(b, a) };
+            out.cost = out.cost.hypot(COLOUR_WEIGHT * off * mesh.position(a).distance(mesh.position(b)));
+        }
+    }
+
+    fn collapsed(&mut self, mesh: &LiveMesh, from: u32, onto: u32, at: Vec3) {
+        self.quadrics.collapsed(mesh, from, onto, at);
+    }
+}
+
+fn unit(c: [u8; 4]) -> Vec3 {
+    Vec3::new(f32::from(c[0]), f32::from(c[1]), f32::from(c[2])) / 255.0
+}
+
 /// For each vertex its wedges.
 fn wedges_of(source: &Source) -> Vec<Vec<u32>> {
     let mut out = vec![vec![]; source.positions.len()];
@@ -86,10 +133,9 @@ fn wedges_of(source: &Source) -> Vec<Vec<u32>> {
 
 /// The wedge that looks most like another: least squared difference of normals and of albedo (over 255), the first of equals.
 fn alike(source: &Source, among: &[u32], to: &Wedge) -> u32 {
-    let colour = |c: [u8; 4]| Vec3::new(f32::from(c[0]), f32::from(c[1]), f32::from(c[2])) / 255.0;
     let off = |w: &u32| {
         let w = &source.wedges[*w as usize];
-        w.normal.distance_squared(to.normal) + colour(w.albedo).distance_squared(colour(to.albedo))
+        w.normal.distance_squared(to.normal) + unit(w.albedo).distance_squared(unit(to.albedo))
     };
     among.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or_default()
 }

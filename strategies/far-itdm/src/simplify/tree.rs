@@ -1,5 +1,7 @@
 //! The first phase: a merge tree in the order of the quadric error.
 
+use std::collections::HashMap;
+
 use farfield_core::collapse::{Candidate, Cost, LiveMesh, Place, Placement, QuadricSettings, Quadrics};
 use glam::Vec3;
 
@@ -24,8 +26,7 @@ pub(super) struct Tree<'a> {
     mesh: &'a Dense,
     extremes: &'a Extremes,
     normals: Vec<Vec3>,
-    /// How far a vertex's stretch of border has moved, pixels.
-    border_px: Vec<f32>,
+    borders: Borders<'a>,
     pub(super) merges: Vec<Merge>,
 }
 
@@ -44,7 +45,7 @@ impl<'a> Tree<'a> {
             mesh,
             extremes,
             normals: normals.into_iter().map(Vec3::normalize_or_zero).collect(),
-            border_px: vec![0.0; mesh.positions.len()],
+            borders: Borders { mesh, extremes, between: HashMap::new() },
             merges: vec![],
         }
     }
@@ -68,6 +69,42 @@ fn next_on_border(live: &LiveMesh, v: u32, beside: u32) -> Option<u32> {
     around.filter(|&x| x != v && x != beside).find(|&x| live.is_border(x) && sides(live, v, x) == 1)
 }
 
+/// The border as it was: for each of its edges that is left, the vertices that went. Tells how far they are from it now.
+struct Borders<'a> {
+    mesh: &'a Dense,
+    extremes: &'a Extremes,
+    /// By the edge's ends, the smaller first; `None` once they were too far to be kept account of.
+    between: HashMap<[u32; 2], Option<Vec<u32>>>,
+}
+
+/// Beyond this no cut follows the border any more, pixels: what comes later is not measured.
+const LOST_PX: f32 = 64.0;
+
+impl Borders<'_> {
+    /// `from` goes; its border runs from `onto` straight to `end` now. The most that a vertex that went is seen to be off it,
+    /// pixels.
+    fn merge(&mut self, from: u32, onto: u32, end: Option<u32>) -> f32 {
+        let key = |a: u32, b: u32| [a.min(b), a.max(b)];
+        let mut gone = vec![from];
+        let mut lost = end.is_none();
+        for other in [Some(onto), end].into_iter().flatten() {
+            match self.between.remove(&key(from, other)) {
+                Some(Some(more)) => gone.extend(more),
+                Some(None) => lost = true,
+                None => {}
+            }
+        }
+        let Some(end) = end else { return f32::INFINITY };
+        let at = |v: u32| self.mesh.positions[v as usize];
+        let off = |&v: &u32| self.extremes.moved(at(v), from_segment(at(v), at(onto), at(end)));
+        let px = if lost { f32::INFINITY } else { gone.iter().map(off).fold(0.0, f32::max) };
+        // Two ways along one edge: whatever closes here is not followed further.
+        let taken = self.between.insert(key(onto, end), (px <= LOST_PX).then_some(gone)).is_some();
+        if taken { f32::INFINITY } else { px }
+    }
+}
+
+/// From a point to the nearest one of a segment.
 fn from_segment(p: Vec3, a: Vec3, b: Vec3) -> Vec3 {
     let d = b - a;
     let t = ((p - a).dot(d) / d.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
@@ -96,11 +133,7 @@ impl Cost for Tree<'_> {
         let error = self.quadrics.half_edge(live, from, onto);
         let mut px = error * self.extremes.along(p, self.normals[from as usize]);
         if live.is_border(from) {
-            let end = next_on_border(live, from, onto).map_or(at, |v| live.position(v));
-            let moved = self.extremes.moved(p, from_segment(p, at, end));
-            let sum = self.border_px[from as usize].max(self.border_px[onto as usize]) + moved;
-            self.border_px[onto as usize] = sum;
-            px = px.max(sum);
+            px = px.max(self.borders.merge(from, onto, next_on_border(live, from, onto)));
         }
         self.merges.push(Merge { from, onto, px });
         self.quadrics.collapsed(live, from, onto, at);

@@ -48,8 +48,11 @@ fn row(m: &mut Model, y: f32, rng: &mut ChaCha8Rng) {
             x += rng.random_range(0.03..0.12);
             tall = rng.random_range(0.7..0.95);
         }
-        let (w, h, deep) =
-            (thick * rng.random_range(0.016..0.045), room * tall * rng.random_range(0.86..1.0), rng.random_range(0.16..0.23));
+        let (w, h, deep) = (
+            thick * rng.random_range(0.016..0.045),
+            room * tall * rng.random_range(0.86..1.0),
+            rng.random_range(0.16..0.23),
+        );
         let pick = set.unwrap_or_else(|| rng.random_range(0..128));
         let back = rng.random_range(0.0..0.015);
         if x + w > right {
@@ -85,7 +88,14 @@ fn volume(m: &mut Model, [x, y, front]: [f32; 3], [w, h, d]: [f32; 3], pick: u32
         });
     }
     m.part(Stuff::Paint, |s| {
-        slab(s, [x, y + 0.004, front - 0.5 * (d + spine) + 0.002], [w - 2.0 * cover, h - 0.008, d - spine - 0.004], 0.0, 0, [232, 222, 196]);
+        slab(
+            s,
+            [x, y + 0.004, front - 0.5 * (d + spine) + 0.002],
+            [w - 2.0 * cover, h - 0.008, d - spine - 0.004],
+            0.0,
+            0,
+            [232, 222, 196],
+        );
     });
 }
 
@@ -98,7 +108,8 @@ fn full(m: &mut Model, paint: Paint, seed: u64) {
 }
 
 pub(super) fn furnish(seed: u64, out: &mut Vec<Thing>) {
-    let along = |at: &[(f64, f64, f64)]| -> Vec<DAffine3> { at.iter().map(|&(x, z, yaw)| put(x, 0.0, z, yaw)).collect() };
+    let along =
+        |at: &[(f64, f64, f64)]| -> Vec<DAffine3> { at.iter().map(|&(x, z, yaw)| put(x, 0.0, z, yaw)).collect() };
     let study = [(8.462, 6.6, 90.0), (8.462, 8.2, 90.0), (8.462, 9.82, 90.0), (11.538, 8.35, -90.0)];
     let other = [(8.462, 7.4, 90.0), (8.462, 9.01, 90.0), (11.538, 9.16, -90.0), (11.662, 9.9, 90.0)];
     let living = [(3.65, 6.062, 0.0), (4.46, 6.062, 0.0), (5.27, 6.062, 0.0), (11.262, 1.2, 90.0)];

@@ -14,7 +14,14 @@ fn curtains(m: &mut Model, w: f32, low: f32, paint: Paint) {
         rod(s, [-0.5 * w - 0.4, 2.3, 0.11], [0.5 * w + 0.4, 2.3, 0.11], 0.014, sides, [110, 84, 60]);
         for x in [-1.0, 1.0] {
             s.ball(to(x * (0.5 * w + 0.42), 2.3, 0.11), 2 + sides / 8, [110, 84, 60], |_| 0.03);
-            rod(s, [x * (0.5 * w + 0.33), 2.3, 0.0], [x * (0.5 * w + 0.33), 2.3, 0.11], 0.009, sides / 2, [110, 84, 60]);
+            rod(
+                s,
+                [x * (0.5 * w + 0.33), 2.3, 0.0],
+                [x * (0.5 * w + 0.33), 2.3, 0.11],
+                0.009,
+                sides / 2,
+                [110, 84, 60],
+            );
         }
     });
     m.part(Stuff::Fabric, |s| {
@@ -84,9 +91,16 @@ fn coats(m: &mut Model) {
         }
     });
     m.part(Stuff::Fabric, |s| {
-        for (x, low, paint) in [(-0.45, 0.72, [70, 82, 104]), (-0.09, 0.9, [150, 112, 70]), (0.27, 0.66, [92, 96, 78])] {
+        for (x, low, paint) in [(-0.45, 0.72, [70, 82, 104]), (-0.09, 0.9, [150, 112, 70]), (0.27, 0.66, [92, 96, 78])]
+        {
             let first = s.mesh.positions.len();
-            s.rounded(to(x, 0.5 * (low + 1.63), 0.085), Vec3::new(0.15, 0.5 * (1.63 - low), 0.05), 0.05, soft.max(2), paint);
+            s.rounded(
+                to(x, 0.5 * (low + 1.63), 0.085),
+                Vec3::new(0.15, 0.5 * (1.63 - low), 0.05),
+                0.05,
+                soft.max(2),
+                paint,
+            );
             for p in &mut s.mesh.positions[first..] {
                 let t = ((1.63 - p.y) / (1.63 - low)).clamp(0.0, 1.0);
                 p.x = x + (p.x - x) * (0.3 + 0.75 * t.sqrt());

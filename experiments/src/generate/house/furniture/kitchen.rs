@@ -190,15 +190,8 @@ fn plate(m: &mut Model) {
     m.part(Stuff::Paint, |s| {
         let disc = [[0.0, 0.0], [0.0, 0.07], [0.014, 0.125], [0.018, 0.125], [0.008, 0.075], [0.006, 0.0]];
         s.lathe(up(0.0, 0.0, 0.0), sides, WHITE, &disc);
-        let cup = [
-            [0.0, 0.0],
-            [0.0, 0.028],
-            [0.02, 0.036],
-            [0.075, 0.042],
-            [0.078, 0.04],
-            [0.022, 0.033],
-            [0.012, 0.0],
-        ];
+        let cup =
+            [[0.0, 0.0], [0.0, 0.028], [0.02, 0.036], [0.075, 0.042], [0.078, 0.04], [0.022, 0.033], [0.012, 0.0]];
         s.lathe(up(0.17, 0.0, -0.1), sides, [90, 130, 168], &cup);
         for (x, long) in [(-0.16, 0.2), (-0.18, 0.19)] {
             rod(s, [x, 0.004, -0.09], [x, 0.004, -0.09 + long], 0.004, 5, STEEL);
@@ -261,5 +254,7 @@ pub(super) fn furnish(out: &mut Vec<Thing>) {
     let places = places.map(|(dx, dz, yaw)| put(x + dx, 0.751, z + dz, yaw));
     out.push(thing("plate", places.to_vec(), plate));
     out.push(thing("fruit bowl", vec![put(x, 0.751, z, 0.0), put(1.07, 0.901, 0.42, 40.0)], bowl));
-    out.push(thing("kitchen board", vec![put(4.36, 0.0, 3.1, -90.0)], |m| super::sleeping::drawers(m, 1.4, 0.36, PINE)));
+    out.push(thing("kitchen board", vec![put(4.36, 0.0, 3.1, -90.0)], |m| {
+        super::sleeping::drawers(m, 1.4, 0.36, PINE)
+    }));
 }

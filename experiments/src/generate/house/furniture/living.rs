@@ -27,7 +27,8 @@ fn sofa(m: &mut Model, seats: u32, paint: Paint) {
         let colors = [[206, 154, 70], [70, 108, 120]];
         for k in 0..seats.min(2) {
             let x = (k as f32 - 0.5) * (w - 0.42);
-            let at = to(x, 0.6, 0.01) * Affine3A::from_rotation_x(-0.45) * Affine3A::from_rotation_z(0.2 - 0.5 * k as f32);
+            let at =
+                to(x, 0.6, 0.01) * Affine3A::from_rotation_x(-0.45) * Affine3A::from_rotation_z(0.2 - 0.5 * k as f32);
             s.rounded(at, Vec3::new(0.2, 0.2, 0.07), 0.07, soft, colors[k as usize]);
         }
     });
@@ -118,7 +119,8 @@ fn pendant(m: &mut Model) {
         s.lathe(up(0.0, 0.0, 0.0), sides, WHITE, &[[-0.03, 0.0], [-0.03, 0.05], [0.02, 0.06], [0.02, 0.0]]);
         rod(s, [0.0, -0.55, 0.0], [0.0, 0.0, 0.0], 0.004, 6, DARK);
         // Outside from the rim to the top, and back inside to the rim.
-        let bell = [[-0.82, 0.205], [-0.82, 0.21], [-0.72, 0.19], [-0.62, 0.11], [-0.58, 0.03], [-0.53, 0.025], [-0.53, 0.0]];
+        let bell =
+            [[-0.82, 0.205], [-0.82, 0.21], [-0.72, 0.19], [-0.62, 0.11], [-0.58, 0.03], [-0.53, 0.025], [-0.53, 0.0]];
         let lining = [[-0.575, 0.0], [-0.625, 0.1], [-0.72, 0.182], [-0.82, 0.205]];
         s.lathe(up(0.0, 0.0, 0.0), sides, [196, 84, 62], &bell);
         s.lathe(up(0.0, 0.0, 0.0), sides, [255, 244, 220], &lining);
@@ -251,7 +253,13 @@ fn globe(m: &mut Model) {
                 *c = [176, 168, 106, 255];
             }
         }
-        s.ring_wheel(to(0.0, 0.78, 0.0) * Affine3A::from_rotation_z(1.15), sides / 3 + 3, 2 * sides, [170, 140, 80], [0.25, 0.008]);
+        s.ring_wheel(
+            to(0.0, 0.78, 0.0) * Affine3A::from_rotation_z(1.15),
+            sides / 3 + 3,
+            2 * sides,
+            [170, 140, 80],
+            [0.25, 0.008],
+        );
         rod(s, [0.0, 0.5, 0.0], [0.0, 0.56, 0.0], 0.012, sides / 2, [170, 140, 80]);
     });
 }
@@ -259,11 +267,14 @@ fn globe(m: &mut Model) {
 fn toys(m: &mut Model) {
     let n = 3 + m.level();
     m.part(Stuff::Paint, |s| {
-        for (x, z, r, paint) in [(0.0, 0.0, 0.11, [206, 54, 48]), (0.3, 0.12, 0.07, [60, 120, 190]), (0.18, -0.2, 0.05, [230, 190, 60])] {
+        for (x, z, r, paint) in
+            [(0.0, 0.0, 0.11, [206, 54, 48]), (0.3, 0.12, 0.07, [60, 120, 190]), (0.18, -0.2, 0.05, [230, 190, 60])]
+        {
             s.ball(to(x, r, z), n, paint, |_| r);
         }
         for (k, paint) in [[70, 150, 90], [222, 170, 60], [190, 70, 60], [70, 110, 180]].into_iter().enumerate() {
-            let at = to(-0.3 + 0.01 * k as f32, 0.04 + 0.08 * k as f32, 0.1) * Affine3A::from_rotation_y(0.4 * k as f32);
+            let at =
+                to(-0.3 + 0.01 * k as f32, 0.04 + 0.08 * k as f32, 0.1) * Affine3A::from_rotation_y(0.4 * k as f32);
             s.rounded(at, Vec3::splat(0.04), 0.006, m_edge(n), paint);
         }
     });
@@ -287,7 +298,9 @@ pub(super) fn furnish(out: &mut Vec<Thing>) {
     let flat = [(5.9, 2.2), (13.0, 2.2), (6.5, 5.2), (9.6, 5.2), (12.7, 5.2)];
     out.push(thing("ceiling light", flat.map(|(x, z)| put(x, 2.6, z, 0.0)).to_vec(), ceiling_light));
     out.push(thing("living room rug", vec![put(3.75, 0.001, 8.5, 90.0)], |m| rug(m, 2.5, 1.8, [150, 62, 52])));
-    out.push(thing("hall runner", vec![put(6.6, 0.001, 5.2, 0.0), put(10.6, 0.001, 5.2, 0.0)], |m| rug(m, 2.8, 0.8, [70, 92, 120])));
+    out.push(thing("hall runner", vec![put(6.6, 0.001, 5.2, 0.0), put(10.6, 0.001, 5.2, 0.0)], |m| {
+        rug(m, 2.8, 0.8, [70, 92, 120])
+    }));
     let rugs = vec![put(10.2, 0.001, 7.6, 0.0), put(13.0, 0.001, 2.1, 90.0), put(9.2, 0.001, 3.0, 0.0)];
     out.push(thing("rug", rugs, |m| rug(m, 1.8, 1.2, [96, 116, 92])));
     let desks = vec![put(10.0, 0.0, 10.1, 180.0), put(13.1, 0.0, 0.62, 0.0)];

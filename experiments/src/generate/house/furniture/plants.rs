@@ -59,7 +59,9 @@ fn palm(m: &mut Model) {
             let angle = 2.4 * f as f32 + rng.random_range(-0.2..0.2);
             let (sn, c) = angle.sin_cos();
             let (reach, rise) = (rng.random_range(0.3..0.62), rng.random_range(0.55..1.15));
-            let at = |t: f32| Vec3::new(c * reach * t * t.sqrt(), 0.3 + rise * (t - 0.42 * t * t) * 1.5, sn * reach * t * t.sqrt());
+            let at = |t: f32| {
+                Vec3::new(c * reach * t * t.sqrt(), 0.3 + rise * (t - 0.42 * t * t) * 1.5, sn * reach * t * t.sqrt())
+            };
             let stem: Vec<Vec3> = (0..=6).map(|i| at(i as f32 / 6.0)).collect();
             s.sweep(&stem, 4, [110, 138, 60], |t| 0.007 * (1.0 - 0.8 * t));
             for k in 0..leaflets {
@@ -85,7 +87,9 @@ fn rubber(m: &mut Model, scale: f32) {
         for stem in 0..3 {
             let (sn, c) = (2.1 * stem as f32).sin_cos();
             let top = Vec3::new(0.12 * c, 0.85 + 0.15 * stem as f32, 0.12 * sn) * scale;
-            s.sweep(&[Vec3::new(0.0, 0.2 * scale, 0.0), top * Vec3::new(0.6, 0.6, 0.6), top], 5, [112, 92, 62], |_| 0.011 * scale);
+            s.sweep(&[Vec3::new(0.0, 0.2 * scale, 0.0), top * Vec3::new(0.6, 0.6, 0.6), top], 5, [112, 92, 62], |_| {
+                0.011 * scale
+            });
         }
         for _ in 0..leaves {
             let (sn, c) = rng.random_range(0.0..std::f32::consts::TAU).sin_cos();
@@ -170,7 +174,8 @@ pub(in crate::generate::house) fn bush(m: &mut Model, paint: Paint, flowers: Opt
         for _ in 0..count {
             let (sn, c) = rng.random_range(0.0..std::f32::consts::TAU).sin_cos();
             let (r, t) = (rng.random_range(0.3..0.44), rng.random_range(0.2..1.2_f32));
-            let p = Vec3::new(0.3 * rng.random_range(-1.0..1.0) + r * c * t.sin(), 0.36 + r * t.cos(), r * sn * t.sin());
+            let p =
+                Vec3::new(0.3 * rng.random_range(-1.0..1.0) + r * c * t.sin(), 0.36 + r * t.cos(), r * sn * t.sin());
             s.ball(Affine3A::from_translation(p), n, color, |_| 0.035);
         }
     });
@@ -215,10 +220,27 @@ pub(in crate::generate::house) fn hedge(m: &mut Model, long: f32, high: f32, see
 }
 
 pub(super) fn furnish(out: &mut Vec<Thing>) {
-    let palms = vec![put(7.9, 0.0, 10.4, 0.0), put(0.6, 0.0, 10.4, 90.0), put(14.4, 0.0, 10.45, 200.0), put(14.5, 0.0, 0.5, 40.0)];
+    let palms = vec![
+        put(7.9, 0.0, 10.4, 0.0),
+        put(0.6, 0.0, 10.4, 90.0),
+        put(14.4, 0.0, 10.45, 200.0),
+        put(14.5, 0.0, 0.5, 40.0),
+    ];
     out.push(thing("palm", palms, palm));
-    let pots = vec![put(5.55, 0.0, 6.95, 0.0), put(7.55, 0.0, 4.0, 50.0), put(4.25, 0.0, 5.7, 80.0), put(11.3, 0.0, 10.5, 0.0)];
+    let pots = vec![
+        put(5.55, 0.0, 6.95, 0.0),
+        put(7.55, 0.0, 4.0, 50.0),
+        put(4.25, 0.0, 5.7, 80.0),
+        put(11.3, 0.0, 10.5, 0.0),
+    ];
     out.push(thing("rubber plant", pots, |m| rubber(m, 1.0)));
-    let small = [(0.28, 1.08 - 0.17, 4.0), (1.9, 1.09, 0.14), (8.8, 0.905, 0.14), (12.8, 0.905, 0.14), (9.8, 0.905, 10.84), (8.0, 0.44, 7.95)];
+    let small = [
+        (0.28, 1.08 - 0.17, 4.0),
+        (1.9, 1.09, 0.14),
+        (8.8, 0.905, 0.14),
+        (12.8, 0.905, 0.14),
+        (9.8, 0.905, 10.84),
+        (8.0, 0.44, 7.95),
+    ];
     out.push(thing("small plant", small.map(|(x, y, z)| put(x, y, z, 60.0 * x)).to_vec(), |m| rubber(m, 0.32)));
 }

@@ -12,7 +12,12 @@ fn knob(m: &mut Model, x: f32, y: f32, z: f32) {
     let sides = 4 + m.level();
     m.part(Stuff::Paint, |s| {
         let at = frame(Vec3::new(x, y, z), Vec3::Z, Vec3::X);
-        s.lathe(at, sides, STEEL, &[[0.0, 0.0], [0.0, 0.006], [0.012, 0.006], [0.016, 0.014], [0.026, 0.01], [0.026, 0.0]]);
+        s.lathe(
+            at,
+            sides,
+            STEEL,
+            &[[0.0, 0.0], [0.0, 0.006], [0.012, 0.006], [0.016, 0.014], [0.026, 0.01], [0.026, 0.0]],
+        );
     });
 }
 

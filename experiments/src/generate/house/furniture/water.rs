@@ -167,5 +167,7 @@ pub(super) fn furnish(out: &mut Vec<Thing>) {
     out.push(thing("basin", vec![put(7.138, 0.0, 2.1, -90.0)], basin));
     out.push(thing("washing machine", vec![put(6.84, 0.0, 3.3, -90.0)], washer));
     out.push(thing("towels", vec![put(4.662, 0.0, 3.2, 90.0)], towels));
-    out.push(thing("bath mat", vec![put(5.85, 0.001, 1.3, 90.0)], |m| super::living::rug(m, 0.9, 0.6, [120, 160, 172])));
+    out.push(thing("bath mat", vec![put(5.85, 0.001, 1.3, 90.0)], |m| {
+        super::living::rug(m, 0.9, 0.6, [120, 160, 172])
+    }));
 }
