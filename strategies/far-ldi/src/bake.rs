@@ -15,6 +15,7 @@ use farfield_core::{Aabb, Camera, Fault};
 use glam::{DVec3, Vec3};
 
 use crate::LayeredDepthImage;
+use crate::enough::Enough;
 use crate::frame::{Framed, Grain, frame};
 use crate::index::{Index, Picture};
 use crate::merge::{Layers, Sample};
@@ -32,40 +33,56 @@ pub(crate) fn bake(
         let seen = sector.seen.intersection(&job.cell.splits[sector.split.index()].far);
         let grain = Grain { density: own.density, max_px: own.max_px };
         let Some(framed) = frame(job.cell, sector, &seen, job.scene, job.views.near, grain)? else { return Ok(None) };
-        let pixels = merged(own, job.cell, sector, &seen, &framed, cx)?;
+        let (pixels, taken) = merged(own, job, sector, &seen, &framed, cx)?;
         let Some((part, bounds)) = part(own, &framed.camera, &pixels)? else { return Ok(None) };
-        let picture = picture(i as u32, sector, job.cell, &framed, &part, bounds);
+        let mut picture = picture(i as u32, sector, job.cell, &framed, &part, bounds);
+        picture.taken = own.enough.as_ref().map(|_| taken[0]);
         let eye = framed.camera.eye;
         out.put(LocalPayload(i as u32), &Payload { origin: eye, bounds, parts: vec![Part::Layered(part)] })?;
-        Ok(Some(picture))
+        Ok(Some((picture, taken)))
     })?;
-    let pictures: Vec<Picture> = made.into_iter().flatten().collect();
+    let (pictures, taken): (Vec<Picture>, Vec<[u32; 2]>) = made.into_iter().flatten().unzip();
     report(own, &pictures, out);
+    report_spared(&taken, out);
     Ok(Index { pictures })
 }
 
-/// Takes the pictures of a window, one at a time, and merges them: the centre's, then the others, nearest to the window first.
+/// Takes the pictures of a window, one at a time, and merges them: the centre's, then the others, nearest to the window first, until
+/// they are enough. Gives also how many were taken, and how many there are places for.
 fn merged(
     own: &LayeredDepthImage,
-    cell: &Cell,
+    job: &CellJob<'_>,
     sector: &Sector,
     seen: &ChunkSet,
     framed: &Framed,
     cx: &Context<'_>,
-) -> Result<Vec<Vec<Sample>>, Fault> {
+) -> Result<(Vec<Vec<Sample>>, [u32; 2]), Fault> {
     let shoot = |camera: Camera| -> Result<SurfaceImage, Fault> {
         cx.check()?;
         let image = cx.capture.shoot(&[Shot { chunks: seen.clone(), camera }])?.pop();
         image.ok_or_else(|| Fault::Refused("a capture that gave no image".into()))
     };
-    let mut layers = Layers::new(framed.camera, own.merge_px, &shoot(framed.camera)?);
-    let mut offsets = places::around(cell, &sector.window, own.construction_images as usize - 1);
+    let mut offsets = places::around(job.cell, &sector.window, own.construction_images as usize - 1);
     offsets.sort_by(|a, b| b.dot(sector.window.axis).total_cmp(&a.dot(sector.window.axis)));
+    let central = shoot(framed.camera)?;
+    let mut layers = Layers::new(framed.camera, own.merge_px, &central);
+    let mut enough = own.enough.as_deref().map(|m| Enough::new(m, job, sector, seen, (framed.camera, central)));
+    let mut taken = [1, 1 + offsets.len() as u32];
     for offset in offsets {
+        if let Some(enough) = &enough
+            && enough.passes(cx)?
+        {
+            break;
+        }
         let camera = places::camera(framed, offset, own.max_px);
-        layers.add(&camera, &shoot(camera)?);
+        let image = shoot(camera)?;
+        layers.add(&camera, &image);
+        taken[0] += 1;
+        if let Some(enough) = &mut enough {
+            enough.add(camera, image);
+        }
     }
-    Ok(layers.finish())
+    Ok((layers.finish(), taken))
 }
 
 /// The layered part and the box of its samples; `None` where there are none.
@@ -139,6 +156,7 @@ fn picture(payload: u32, sector: &Sector, cell: &Cell, framed: &Framed, part: &L
         deepest: u32::from(part.counts.iter().copied().max().unwrap_or(0)),
         coarse: framed.coarse,
         rounding_px: part.rounding_px(moved.min(0.5 * near), sector.window.px_per_tan),
+        taken: None,
     }
 }
 
@@ -153,5 +171,17 @@ fn report(own: &LayeredDepthImage, pictures: &[Picture], out: &dyn Sink) {
             worst.recip()
         );
         out.left_out(LeftOut { stage: "image density".into(), reason, decided: "build".into() });
+    }
+}
+
+/// Says how many of the pictures that there are places for were not taken.
+fn report_spared(taken_of: &[[u32; 2]], out: &dyn Sink) {
+    let [taken, places] =
+        taken_of.iter().fold([0u64; 2], |sum, t| [sum[0] + u64::from(t[0]), sum[1] + u64::from(t[1])]);
+    if taken < places {
+        let n = taken_of.len() as f64;
+        let [spared, each] = [places - taken, places].map(|k| k as f64 / n);
+        let reason = format!("on average {spared:.2} of {each:.2} an image were not needed");
+        out.left_out(LeftOut { stage: "construction images".into(), reason, decided: "build".into() });
     }
 }

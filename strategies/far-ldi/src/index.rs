@@ -41,6 +41,9 @@ pub struct Picture {
     /// A bound of how far rounding of depths moves a sample's image, pixels, for eyes of the cell that are at most half-way to the
     /// nearest sample and look at it.
     pub rounding_px: f32,
+    /// How many construction images it was made of, where a metric decided that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taken: Option<u32>,
 }
 
 impl Index {

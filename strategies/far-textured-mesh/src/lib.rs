@@ -52,7 +52,8 @@ pub struct TexturedLodMesh {
     #[serde(default = "defaults::edge_px")]
     #[schemars(range(min = 0.0), extend("unit" = "px"))]
     pub edge_px: f32,
-    /// Decides whether the view from the centre serves the whole cell.
+    /// Decides whether the view from the centre serves the whole cell. `self-occlusion` knows an object's depth and bounds the holes that
+    /// it lets through; `void-surface` judges the picture from the centre, so that slots and gaps count, and bounds no width.
     #[serde(default = "defaults::view_test")]
     #[schemars(with = "Value", extend("strategy" = "visibility_metric"))]
     pub view_test: Box<dyn VisibilityMetric>,

@@ -126,7 +126,7 @@ pub(crate) fn simplify(
     let size_px = views[0].camera.size.map(|n| n as f32);
     let mut baked = assemble(own, &mesh, &out, &seen, views);
     baked.passes = verdict.passes;
-    // A test that knows no pixels bounds no hole in pixels.
+    // A test that knows no pixels bounds no hole in pixels; a solid angle is of the piece before it is simplified, and is not claimed.
     let in_px = verdict.passes && verdict.quantity == Quantity::HoleWidthPx;
     baked.hole_px = in_px.then_some(verdict.claim + erosion_px);
     baked.error_px = if in_px { verdict.value as f32 } else { own.edge_px };

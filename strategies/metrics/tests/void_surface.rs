@@ -264,3 +264,87 @@ fn a_far_threshold_makes_skins_of_what_lies_beyond_it() {
     assert_eq!(value(Some(1e6), 0.2), all);
     assert!(value(None, all.value).passes && !value(None, all.value * 0.99).passes);
 }
+
+/// A box with slots that open towards the cell: much of it is seen from beside the middle only.
+fn comb() -> Vec<Sheet> {
+    let mut out = sides(Vec3::new(-1.0, -1.0, -3.0), Vec3::new(1.0, 1.0, -2.6));
+    for k in 0..4 {
+        let x = -1.0 + 0.56 * k as f32;
+        out.extend(sides(Vec3::new(x, -1.0, -2.6), Vec3::new(x + 0.32, 1.0, -1.0)));
+    }
+    out
+}
+
+/// The two metrics' values of an object whose middle is `distance` ahead of a cell of edge 5: steradians and pixels.
+fn two_words(shape: &[Sheet], distance: f32) -> [f64; 2] {
+    let world = World::new(shape, 1.0);
+    let views = world.views();
+    let cell = world.cell(Vec3::new(0.0, 0.0, distance - 2.0), 2.5, true);
+    let eye = cell.outline.centre.as_dvec3();
+    // Four times as fine as a view: a slot less than a pixel wide is unknown.
+    let px = 4.0 * views.px_per_tan();
+    let camera = farfield_core::Camera::around(eye, -Vec3::Z, world.bounds.corners(), px, 2, world.near()).unwrap();
+    let pictures = world.shoot(&[camera]);
+    let corners = cell.outline.region.corners().unwrap();
+    let place = |p: Vec3| world.local(p).as_vec3();
+    let faces = |[p, a, b]: &&Sheet| corners.iter().any(|c| a.cross(*b).dot(*c - place(*p)) > 0.0);
+    let facing: Vec<Vec3> =
+        shape.iter().filter(faces).flat_map(|[p, a, b]| [*p, p + a, p + b, p + a + b].map(place)).collect();
+    let subject = farfield_core::strategy::Subject { facing: &facing, ..world.subject(&cell, &views, &pictures) };
+    let metrics: [Box<dyn VisibilityMetric>; 2] = [
+        Box::new(VoidSurface { face_px: 256, ..VoidSurface::default() }),
+        Box::new(farfield_metrics::SelfOcclusion::default()),
+    ];
+    metrics.map(|m| world.with(1, |cx| m.judge(&subject, cx)).unwrap().value)
+}
+
+/// Spearman's: the correlation of ranks.
+fn rank_correlation(pairs: &[[f64; 2]]) -> f64 {
+    let rank = |k: usize, i: usize| pairs.iter().filter(|p| p[k] < pairs[i][k]).count() as f64;
+    let n = pairs.len() as f64;
+    let apart: f64 = (0..pairs.len()).map(|i| (rank(0, i) - rank(1, i)).powi(2)).sum();
+    1.0 - 6.0 * apart / (n * (n * n - 1.0))
+}
+
+#[test]
+fn objects_come_in_the_order_of_self_occlusion_and_what_is_slotted_has_more_void() {
+    let plate = sides(Vec3::new(-1.0, -1.0, -1.2), Vec3::new(1.0, 1.0, -1.0));
+    let block = sides(Vec3::new(-1.0, -1.0, -3.0), Vec3::new(1.0, 1.0, -1.0));
+    let mut pairs = vec![];
+    for distance in [8.0, 16.0, 32.0, 64.0, 128.0] {
+        let [plate, block, comb] = [&plate, &block, &comb()].map(|s| two_words(s, distance));
+        println!("{distance}: {plate:?} {block:?} {comb:?} sr, px");
+        assert!(plate[0] < block[0] && block[0] < comb[0], "at {distance}");
+        // Only the void surface tells a slotted box from a full one.
+        assert!((block[1] - comb[1]).abs() < 1e-3 * block[1]);
+        pairs.extend([plate, block, comb]);
+    }
+    for shape in 0..3 {
+        let of_shape: Vec<[f64; 2]> = pairs.iter().skip(shape).step_by(3).copied().collect();
+        assert!(of_shape.windows(2).all(|w| w[1][0] < w[0][0] && w[1][1] < w[0][1]), "{of_shape:?} fall with distance");
+        assert_eq!(rank_correlation(&of_shape), 1.0);
+        // Strips as high as the object and s wide: F / s falls as the object's height in the view does, far off.
+        let [near, far] = [of_shape[2], of_shape[4]].map(|p| p[0] / p[1]);
+        println!("shape {shape}: {}", near / far);
+        assert!(shape == 0 || (near / far / 4.0 - 1.0).abs() < 0.35, "{near} {far}");
+    }
+    let all = rank_correlation(&pairs);
+    println!("rank correlation over {} objects: {all:.3}", pairs.len());
+    assert!(all > 0.9);
+}
+
+#[test]
+fn of_an_object_rays_find_less_unseen_than_the_void_surface_says() {
+    for (shape, most) in [(comb(), 12.0), (sides(Vec3::new(-1.0, -1.0, -3.0), Vec3::new(1.0, 1.0, -1.0)), 40.0)] {
+        let world = World::new(&shape, 1.0);
+        let (centre, from) = (Vec3::new(0.0, 0.0, 4.0), Vec3::new(2.5, 0.0, 1.5));
+        let eye = world.local(centre);
+        let camera =
+            farfield_core::Camera::around(eye, -Vec3::Z, world.bounds.corners(), 400.0, 2, world.near()).unwrap();
+        let found = world.voids(&world.shoot(&[camera])).unseen(world.local(from), 2 * PX, world.near());
+        let truth = compare(&found, &world.truly_unseen(from, &[centre], 2 * PX), 2 * PX);
+        println!("{truth:?}");
+        assert!(truth.true_sr > 20.0 * PIXEL_SR && found.sr > truth.true_sr - truth.border_sr);
+        assert!(found.sr < most * truth.true_sr, "{most}");
+    }
+}

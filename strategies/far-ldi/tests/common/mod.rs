@@ -163,7 +163,7 @@ fn pipe(sides: u32) -> TriangleMesh {
 }
 
 /// A box of edge 1 around the origin, its faces flat and of different colours.
-fn block() -> TriangleMesh {
+pub(crate) fn block() -> TriangleMesh {
     let mut m = TriangleMesh::default();
     for (k, n) in [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z].into_iter().enumerate() {
         let a = if n.y == 0.0 { Vec3::Y } else { Vec3::Z };

@@ -16,12 +16,18 @@
 //! the paper triangulates between pixels' centres. Only what the void hides within the subject's bounds counts: a skin behind the
 //! last of them hides nothing of it. Beside corners taken as samples there are candidates in corners that are none. A background is
 //! endless space of which nothing is known behind a silhouette either: what stands alone before the sky has a void though
-//! nothing may be there.
+//! nothing may be there. Of a subject that fits one picture, an object or a window, F is counted in that picture, so that a
+//! far one is counted as finely as a near one.
+//!
+//! F is an angle whatever the subject's size: 0.2 sr suit what is all round. An object's F lies below its own solid angle, and a hole
+//! of n pixels takes n / q^2 of it, with q the view's pixels a unit of tangent (443 for 512 pixels of 60 degrees: 100 pixels
+//! are 5e-4 sr).
 //!
 //! **F is an estimate.** A ray that passes through unknown space to a surface that some sample saw counts: something might stand
 //! there (F too large; among hanging blocks by a fifth to a half). Test 2 marks surfaces seen at a grazing angle that were seen (F too large); a hole narrower than a pixel of a sample is
 //! unknown (too small); between the candidates F may be larger. The claim is the value itself, and an audit may refute it. Beside the
-//! pictures of a sample that is no whole cube nothing is known and nothing counted.
+//! pictures of a sample that is no whole cube nothing is known and nothing counted: samples that are windows have to hold the same
+//! part of space, or the one that does not would clear what the others know to be hidden.
 //!
 //! Cost: O(n p) for n samples of p pixels, O(n^2) for edges that bend (test 3), then for every candidate O(n p) at worst; surfaces
 //! are drawn only where walls of all samples overlap. A sample holds some 50 bytes a pixel meanwhile.
@@ -34,12 +40,12 @@ mod voids;
 
 pub use voids::{Unseen, Voids};
 
-use farfield_core::Fault;
 use farfield_core::claim::Quantity;
 use farfield_core::context::{Context, collect};
 use farfield_core::panorama::SkinTests;
 use farfield_core::region::Region;
 use farfield_core::strategy::{Subject, Verdict, VisibilityMetric};
+use farfield_core::{Aabb, Camera, Fault};
 use glam::{DVec2, DVec3, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -68,13 +74,13 @@ pub struct VoidSurface {
     pub max_sr: f64,
     /// An edge between two pixels at a smaller angle to the view ray is a skin.
     #[serde(default = "five")]
-    #[schemars(range(min = 0.0, max = 90.0), extend("unit" = "degrees"))]
+    #[schemars(range(min = 0.0, max = 90.0), extend("unit" = "deg"))]
     pub alpha_deg: f32,
     /// An edge that reaches farther is a skin; by default none is for that.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("unit" = "scene units"))]
     pub far: Option<f32>,
-    /// Edge of the six pictures in which the void is counted.
+    /// Edge of the six pictures in which the void is counted; where the subject fits one picture, that one's longer edge.
     #[serde(default = "faces")]
     #[schemars(range(min = 8, max = 4096), extend("unit" = "px"))]
     pub face_px: u32,
@@ -154,7 +160,12 @@ impl VoidSurface {
         let near = subject.views.near;
         let values = collect(cx.run, places.len(), &|i| {
             cx.check()?;
-            Ok(voids.unseen(places[i].as_dvec3(), self.face_px, near).sr)
+            let eye = places[i].as_dvec3();
+            let cameras = match framed(eye, &subject.bounds, self.face_px, near) {
+                Some(camera) => vec![camera],
+                None => Camera::cube(eye, self.face_px, near).to_vec(),
+            };
+            Ok(voids.unseen_in(cameras).sr)
         })?;
         // Of equal ones the first.
         let first = |best: Option<(Vec3, f64)>, now: (Vec3, f64)| Some(best.filter(|b| b.1 >= now.1).unwrap_or(now));
@@ -178,6 +189,26 @@ impl VoidSurface {
         Ok(())
     }
 }
+
+/// The picture that just holds the bounds; `None` where they do not lie ahead within [`WIDEST_TAN`].
+fn framed(eye: DVec3, bounds: &Aabb, face_px: u32, near: f32) -> Option<Camera> {
+    let axis = (bounds.centre().as_dvec3() - eye).as_vec3();
+    // Rounding outwards takes two pixels at most.
+    let around = |px_per_tan: f32| Camera::around(eye, axis, bounds.corners(), px_per_tan, 0, near);
+    let fine = around(FINE)?;
+    let reach = [-fine.left, fine.right_tan, -fine.bottom, fine.top].into_iter().fold(0.0, f32::max);
+    let extent = (fine.right_tan - fine.left).max(fine.top - fine.bottom);
+    if reach.partial_cmp(&WIDEST_TAN) != Some(std::cmp::Ordering::Less) {
+        return None;
+    }
+    around((face_px - 2) as f32 / extent)
+}
+
+/// A subject that reaches farther from the middle of a picture is counted all round: one picture's pixels would differ too much.
+const WIDEST_TAN: f32 = 2.0;
+
+/// Pixels a unit of tangent at which a subject's extent is measured.
+const FINE: f32 = (1u32 << 20) as f32;
 
 /// Where the samples were taken.
 pub(crate) fn eyes(subject: &Subject<'_>) -> Vec<DVec3> {

@@ -33,8 +33,8 @@ struct Sample {
 pub struct Unseen {
     /// The objective function F: the solid angle, steradians.
     pub sr: f64,
-    /// The six pictures around the viewpoint.
-    pub cameras: [Camera; 6],
+    /// The pictures from the viewpoint: six all round, or those that were asked for.
+    pub cameras: Vec<Camera>,
     /// Their pixels, picture by picture, row by row: whether they belong to the global void surface.
     pub mask: Vec<bool>,
 }
@@ -67,11 +67,16 @@ impl Voids {
     }
 
     /// What may be seen from `eye` in six pictures of `face_px` x `face_px` that begin at `near`.
+    pub fn unseen(&self, eye: DVec3, face_px: u32, near: f32) -> Unseen {
+        self.unseen_in(Camera::cube(eye, face_px, near).to_vec())
+    }
+
+    /// What may be seen in pictures of one eye, as [`Voids::unseen`]; 0 in none.
     ///
     /// Walls come first: a pixel stays in question while every sample has one there, before the ray leaves the bounds. Only
     /// there does it matter whether a surface lies before the last sample's nearest wall.
-    pub fn unseen(&self, eye: DVec3, face_px: u32, near: f32) -> Unseen {
-        let cameras = Camera::cube(eye, face_px, near);
+    pub fn unseen_in(&self, cameras: Vec<Camera>) -> Unseen {
+        let eye = cameras.first().map_or(DVec3::ZERO, |c| c.eye);
         let raster = Raster::new(&cameras);
         let mut limits = self.exits(eye, &raster);
         let mut deepest = vec![0f32; limits.len()];
@@ -112,7 +117,7 @@ impl Voids {
             });
         }
         let mask: Vec<bool> = limits.iter().map(|&l| l > 0.0).collect();
-        Unseen { sr: solid_angle(&cameras[0], &mask), cameras, mask }
+        Unseen { sr: solid_angle(&cameras, &mask), cameras, mask }
     }
 
     /// The depth at which each pixel's ray leaves the bounds; 0 where it does not meet them.
@@ -134,15 +139,13 @@ impl Voids {
     }
 }
 
-/// The solid angle of a cube's pixels, the same in all six faces.
-fn solid_angle(face: &Camera, mask: &[bool]) -> f64 {
-    let [w, h] = face.size;
-    let weights: Vec<f64> =
-        (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| pixel_solid_angle_sr(face, x, y)).collect();
-    mask.chunks(weights.len())
-        .flat_map(|m| m.iter().zip(&weights))
-        .filter(|(m, _)| **m)
-        .fold(0.0, |sum, (_, w)| sum + w)
+/// The solid angle of the pixels of pictures that a mask holds.
+fn solid_angle(cameras: &[Camera], mask: &[bool]) -> f64 {
+    let pixels = cameras.iter().flat_map(|c| {
+        let [w, h] = c.size;
+        (0..h).flat_map(move |y| (0..w).map(move |x| (c, x, y)))
+    });
+    pixels.zip(mask).filter(|(_, m)| **m).fold(0.0, |sum, ((c, x, y), _)| sum + pixel_solid_angle_sr(c, x, y))
 }
 
 impl Sample {
@@ -200,7 +203,7 @@ mod tests {
     #[test]
     fn a_mask_of_all_pixels_is_all_around_whatever_their_number() {
         for px in [8, 33, 128, 512] {
-            let face = Camera::cube(DVec3::ZERO, px, 0.1)[0];
+            let face = Camera::cube(DVec3::ZERO, px, 0.1);
             let n = (6 * px * px) as usize;
             let all = solid_angle(&face, &vec![true; n]);
             assert!((all / (4.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6, "{all}");
