@@ -72,7 +72,7 @@ fn clock(m: &mut Model) {
         slab(s, [0.0, 1.94, 0.028], [0.012, 0.12, 0.006], 0.0, 0, DARK);
         slab(s, [0.04, 1.945, 0.034], [0.09, 0.012, 0.004], 0.0, 0, DARK);
         for k in 0..12 {
-            let turn = Affine3A::from_rotation_z(0.5236 * k as f32);
+            let turn = Affine3A::from_rotation_z(std::f32::consts::FRAC_PI_6 * k as f32);
             let tick = to(0.0, 1.95, 0.022) * turn * to(0.0, 0.13, 0.0);
             s.block(tick, Vec3::new(0.004, 0.012, 0.003), DARK);
         }
@@ -118,7 +118,9 @@ pub(super) fn furnish(out: &mut Vec<Thing>) {
     out.push(thing("bedroom curtains", beds, |m| curtains(m, 1.8, 0.5, [126, 146, 176])));
     let work = vec![put(10.0, 0.0, 10.848, 180.0), put(13.2, 0.0, 10.848, 180.0), put(14.848, 0.0, 8.5, -90.0)];
     out.push(thing("curtains", work, |m| curtains(m, 1.7, 0.45, [150, 74, 66])));
-    let walls: [(u32, f32, f32, Paint, &[(f64, f64, f64)]); 6] = [
+    // Where it hangs: x, z, turn.
+    type Places = &'static [(f64, f64, f64)];
+    let walls: [(u32, f32, f32, Paint, Places); 6] = [
         (0, 1.0, 0.7, WALNUT, &[(8.338, 7.0, -90.0), (7.262, 3.2, 90.0)]),
         (1, 0.6, 0.8, DARK, &[(11.662, 7.2, 90.0), (5.3, 5.938, 180.0)]),
         (2, 0.5, 0.4, OAK, &[(11.4, 5.938, 180.0), (4.538, 2.4, -90.0), (14.0, 4.338, 180.0)]),

@@ -119,7 +119,7 @@ fn cupboard(m: &mut Model) {
     let n = m.edge().min(3);
     m.part(Stuff::Paint, |s| {
         slab(s, [0.0, 1.425, 0.31], [0.59, 0.71, 0.02], 0.006, n, FRONT);
-        slab(s, [0.0, 1.475, 0.318], [0.47, 0.61, 0.014], 0.006, n, FRONT.map(|c| c - 10));
+        slab(s, [0.0, 1.475, 0.3175], [0.47, 0.61, 0.014], 0.006, n, FRONT.map(|c| c - 10));
     });
     handle(m, 0.18, 1.48, 0.325, 0.12);
 }

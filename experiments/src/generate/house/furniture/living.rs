@@ -89,7 +89,7 @@ fn television(m: &mut Model) {
 /// A standing lamp with a cloth shade, `high` high.
 fn lamp(m: &mut Model, high: f32) {
     let sides = m.sides();
-    let k = high.min(1.0).max(0.4);
+    let k = high.clamp(0.4, 1.0);
     m.part(Stuff::Paint, |s| {
         let foot = [
             [0.0, 0.0],
