@@ -211,7 +211,7 @@ fn levels_fall_by_the_ratio_and_their_errors_rise_and_are_no_less_than_what_is_s
 }
 
 #[test]
-fn threads_change_nothing() {
+fn the_order_of_jobs_changes_nothing() {
     let at: Vec<(usize, DAffine3)> =
         (0..7).map(|k| (k % 2, DAffine3::from_translation(DVec3::new(4.0 * k as f64, 0.0, 0.0)))).collect();
     let scene = placed(vec![hills(12), wall(10)], &at, None);

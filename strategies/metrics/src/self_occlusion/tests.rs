@@ -182,7 +182,6 @@ fn a_sample_in_the_centre_changes_nothing_and_more_bring_it_under_the_threshold(
         values.push(now.value);
         assert!(eyes.len() < 60, "{values:?}");
     }
-    println!("{} samples: {values:?}", eyes.len());
     assert!(values.windows(2).all(|v| v[1] <= v[0]) && values[values.len() - 1] < max_px);
     // s is R times a number that the samples do not change.
     assert!((values[0] / alone.value - 1.0).abs() < 1e-9 && eyes.len() > 4);
@@ -216,6 +215,5 @@ fn the_claim_with_several_samples_holds_for_the_nearest_one() {
             worst = worst.max(p.truncate().distance(q.truncate()));
         }
     }
-    println!("{worst} px of {} claimed", verdict.claim);
     assert!(f64::from(worst) <= verdict.claim && f64::from(worst) > 0.1 * verdict.claim);
 }
