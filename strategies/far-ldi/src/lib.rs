@@ -48,7 +48,7 @@ pub struct LayeredDepthImage {
     /// Decides when fewer pictures are enough; without it all are taken. After each picture it judges what those so far show to viewpoints
     /// between the nine places, and while it does not pass one more is taken, nearest to the window first. For `void-surface` on eyes at
     /// many heights: `candidates = "solid"`. Takes longer to build than nine pictures; saves samples.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     #[schemars(with = "Value", extend("strategy" = "visibility_metric"))]
     pub enough: Option<Box<dyn VisibilityMetric>>,
     /// Pixels of the image a pixel of the window.
