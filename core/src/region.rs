@@ -95,6 +95,15 @@ impl Region {
         }
     }
 
+    /// A point brought into a ball; what bounds a ball from outside (its footprint, its corners) stands a little beside it. Boxes and
+    /// prisms hold their own corners: the point itself.
+    pub fn brought_in(&self, p: Vec3) -> Vec3 {
+        match self {
+            Self::Sphere { centre, radius } => *centre + (p - *centre).clamp_length_max(*radius),
+            _ => p,
+        }
+    }
+
     /// A viewpoint from three numbers in 0..1, uniformly spread where they are; `None` where it has no bound.
     pub fn sample(&self, u: [f32; 3]) -> Option<Vec3> {
         match self {

@@ -91,6 +91,8 @@ pub enum SettingType {
         maximum: Option<f64>,
         /// Values have to be above this.
         above: Option<f64>,
+        /// Values have to be below this.
+        below: Option<f64>,
     },
     /// Text.
     Text,
@@ -173,6 +175,7 @@ fn setting_type(field: &Value) -> Option<SettingType> {
                 minimum: number("minimum"),
                 maximum: number("maximum"),
                 above: number("exclusiveMinimum"),
+                below: number("exclusiveMaximum"),
             }),
             "string" => Some(SettingType::Text),
             "array" => Some(SettingType::Numbers(number("maxItems").map(|n| n as usize))),
@@ -232,7 +235,7 @@ mod tests {
     fn a_settings_table_is_read_from_the_schema() {
         let s = settings_of::<Example>();
         let by = |n: &str| s.iter().find(|x| x.name == n).unwrap();
-        assert_eq!(by("edge").ty, SettingType::Number { minimum: None, maximum: None, above: Some(0.0) });
+        assert_eq!(by("edge").ty, SettingType::Number { minimum: None, maximum: None, above: Some(0.0), below: None });
         assert_eq!((by("edge").unit.as_str(), by("edge").doc.as_str()), ("scene units", "Edge of a cell."));
         assert_eq!(by("edge").default, Value::Null);
         assert_eq!(by("count").default, Value::from(0));

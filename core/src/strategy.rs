@@ -159,6 +159,17 @@ pub trait FarField: Send + Sync + Debug {
         Ok(vec![])
     }
 
+    /// The limits that its settings put on what a frame draws; by default none. Claims speak of frames that no budget cuts short.
+    fn draw_budget(&self) -> DrawBudget {
+        DrawBudget::default()
+    }
+
+    /// The settings that only frames depend on: what is baked is the same whatever they say, so that they are no part of a store
+    /// key. By default none.
+    fn frame_settings(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// Raised whenever the same job gives other bytes: part of every store key. By default 1.
     fn version(&self) -> u32 {
         1

@@ -176,20 +176,20 @@ pub struct ErrorSummary {
     /// Pixels whose depth differs from the reference's by more than 1 %, or where only one of the two shows a surface, over all
     /// pixels.
     #[serde(default)]
-    pub depth_off_fraction: MeanMax,
+    pub depth_off_fraction: Option<MeanMax>,
     /// Pairs of frames that follow each other over which change was measured.
     #[serde(default)]
     pub frame_pairs: usize,
     /// Change of the error from frame to frame, over these pairs: mean over pixels of |E_i - E_(i-1)|, E = the candidate's luminance
     /// less the reference's, grey levels.
     #[serde(default)]
-    pub temporal_change_grey_levels: MeanMax,
+    pub temporal_change_grey_levels: Option<MeanMax>,
     /// Of the pairs, those whose two frames are served by different cells.
     #[serde(default)]
     pub frame_pairs_at_borders: usize,
     /// The same over those.
     #[serde(default)]
-    pub temporal_change_at_borders_grey_levels: MeanMax,
+    pub temporal_change_at_borders_grey_levels: Option<MeanMax>,
 }
 
 /// A claim against what was measured. Measuring samples: it can refute, not prove.

@@ -44,11 +44,18 @@ pub fn at(
     if out.parent().is_some_and(|p| !p.as_os_str().is_empty() && !p.is_dir()) {
         return refused("there is no such folder");
     }
+    if out.is_dir() {
+        return refused("it is a folder");
+    }
     let loaded = scene::scene(experiment)?;
     loaded.warnings.iter().for_each(|w| (options.say)(&format!("warning: {w}")));
     let scene = Arc::new(loaded.scene);
     let near = path::views(&experiment.view, &scene).near;
     let eye = DVec3::from(world) - scene.origin;
+    if !eye.as_vec3().is_finite() {
+        let what = format!("no sample can be taken at {world:?}");
+        return Err(Failure::input(what, "it is farther from the scene than 32-bit numbers reach"));
+    }
     let capture = run::capture_of(experiment, &scene)?;
     let shots = Shots { capture: &*capture, face_px, near, origin: scene.origin };
     shots.write(eye, &scene.all_chunks(), out)
@@ -69,7 +76,7 @@ pub fn of_cell(
     options: &Options<'_>,
 ) -> Result<String, Failure> {
     let index = run::position(experiment, pipeline)?;
-    if out.exists() && !out.is_dir() {
+    if out.ancestors().find(|p| p.exists()).is_some_and(|p| !p.is_dir()) {
         let what = format!("{}: no samples can be written there", out.display());
         return Err(Failure::input(what, "it is not a folder"));
     }
@@ -88,23 +95,33 @@ pub fn of_cell(
     }
     let viewpoints = opened.viewpoints(id);
     if viewpoints.is_empty() {
-        return Err(no_viewpoints(pipeline, id, "it names no viewpoints that it was sampled from"));
+        // The store has been filled by now: this is not what wrong input may do.
+        let what = format!("the far field of pipeline \"{pipeline}\" was not sampled for cell {}", id.0);
+        return Err(Failure::work(what, "it names no viewpoints that it was sampled from"));
     }
     let unwritten = |e| Failure::work(format!("{} cannot be written", out.display()), e);
     std::fs::create_dir_all(out).map_err(unwritten)?;
     let shots = Shots { capture: &*capture, face_px, near: prepared.views.near, origin: prepared.scene.origin };
     let bar = progress.samples(pipeline, viewpoints.len());
-    let mut said = String::new();
+    let (mut said, next) = (String::new(), out.join(name(viewpoints.len())));
     for (number, (split, far, eye)) in viewpoints.into_iter().enumerate() {
         if options.cancel.load(Ordering::Relaxed) {
             return Err(Failure::Cancelled);
         }
-        let line = shots.write(eye, far, &out.join(format!("{number:03}.exr")))?;
+        let line = shots.write(eye, far, &out.join(name(number)))?;
         said += &format!("cell {}, split {}: {line}", id.0, split.0);
         bar.inc();
     }
     bar.done();
+    if next.exists() {
+        (options.say)(&format!("warning: {} and later files are of an earlier run", next.display()));
+    }
     Ok(said)
+}
+
+/// The file of a viewpoint's sample.
+fn name(number: usize) -> String {
+    format!("{number:03}.exr")
 }
 
 /// The cell that is asked for, or that of the path's first camera.

@@ -28,6 +28,21 @@ use crate::image::SurfaceImage;
 /// The eight directions to a pixel's neighbours as (x, y), y down the picture, counter-clockwise from the right. Opposite ones are four apart.
 pub const AROUND: [(i32, i32); 8] = [(1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1)];
 
+/// About `most` of the points that pictures show, spread over all of them, local frame.
+pub fn spread(samples: &[(Camera, SurfaceImage)], most: usize) -> Vec<Vec3> {
+    let pixels: usize = samples.iter().map(|s| s.1.depth.len()).sum();
+    let every = pixels.div_ceil(most).max(1);
+    let of = |(c, image): &(Camera, SurfaceImage)| -> Vec<Vec3> {
+        let point = |i: usize| {
+            let (x, y) = (i as u32 % c.size[0], i as u32 / c.size[0]);
+            let ray = c.ray(x as f32 + 0.5, y as f32 + 0.5).as_dvec3();
+            (c.eye + ray * f64::from(image.depth[i])).as_vec3()
+        };
+        (0..image.depth.len()).step_by(every).filter(|&i| image.hit(i)).map(point).collect()
+    };
+    samples.iter().flat_map(of).collect()
+}
+
 /// The pictures of one eye. Pictures do not overlap: a direction is seen in one of them, or in none.
 pub struct Panorama<'a> {
     views: &'a [(Camera, SurfaceImage)],

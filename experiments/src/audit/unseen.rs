@@ -186,7 +186,9 @@ mod tests {
                 (vec![0, 2], cap(8.0, 30.0)),
                 (vec![2], cap(8.0, 30.0) - cap(2.0, 10.0)),
             ] {
-                for m in measured(&scene, &dropped, 1.0) {
+                let found = measured(&scene, &dropped, 1.0);
+                assert!(!found.is_empty(), "nothing was measured");
+                for m in found {
                     // Viewpoints off the middle by 0.09, pixels along the outline.
                     assert!(
                         (m.measured - expected).abs() <= 0.03 * expected,

@@ -166,9 +166,10 @@ impl Site<'_> {
 
     /// What all cells share, and whether it was built just now.
     fn scene_asset(&self, pipeline: &Pipeline) -> Result<(Key, Manifest, bool), Fault> {
-        let settings = &pipeline.resolved["far_field"];
-        let base = self.base("scene asset", settings, pipeline.far_field.version())?;
-        let asset = key("scene asset", &[&base, self.capture.identity().as_bytes()]);
+        let base = self.base("scene asset", &baked_settings(pipeline), pipeline.far_field.version())?;
+        let needs = pipeline.far_field.needs(self.scene, None)?;
+        let identity = if needs.captures { self.capture.identity() } else { "" };
+        let asset = key("scene asset", &[&base, identity.as_bytes()]);
         if let Some(known) = self.whole(&asset) {
             return Ok((asset, known, false));
         }
@@ -201,7 +202,7 @@ impl Site<'_> {
         if !needs.cell_asset {
             return Ok((id, BuiltCell { cell, manifest: Some(Manifest::default()) }, needs, false));
         }
-        let base = self.base("cell asset", &pipeline.resolved["far_field"], pipeline.far_field.version())?;
+        let base = self.base("cell asset", &baked_settings(pipeline), pipeline.far_field.version())?;
         let identity = if needs.captures { self.capture.identity() } else { "" };
         let outlines = if needs.neighbour_cells { encode(&division.cells.outlines())? } else { vec![] };
         let shared_key = shared.map_or([0; 32], |s| s.0);
@@ -249,4 +250,13 @@ pub fn peak_rss_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
     line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<u64>().ok()).unwrap_or(0) * 1024
+}
+
+/// A far field's settings without those that only frames depend on.
+fn baked_settings(pipeline: &Pipeline) -> serde_json::Value {
+    let mut settings = pipeline.resolved["far_field"].clone();
+    if let Some(table) = settings.as_object_mut() {
+        pipeline.far_field.frame_settings().iter().for_each(|&name| _ = table.remove(name));
+    }
+    settings
 }

@@ -128,24 +128,23 @@ impl Walk<'_, '_> {
             (SettingType::Integer { minimum, maximum }, What::Leaf(Value::Number(n))) if !n.is_f64() => {
                 let x = n.as_f64().unwrap_or_default();
                 if minimum.is_some_and(|m| x < m) || maximum.is_some_and(|m| x > m) {
-                    return wrong(self, &range("a whole number", *minimum, *maximum, None));
+                    return wrong(self, &range("a whole number", [*minimum, *maximum], [None; 2]));
                 }
                 Some(Value::Number(n.clone()))
             }
             (SettingType::Integer { minimum, maximum }, _) => {
-                wrong(self, &range("a whole number", *minimum, *maximum, None))
+                wrong(self, &range("a whole number", [*minimum, *maximum], [None; 2]))
             }
-            (SettingType::Number { minimum, maximum, above }, What::Leaf(Value::Number(n))) => {
+            (SettingType::Number { minimum, maximum, above, below }, What::Leaf(Value::Number(n))) => {
                 let x = n.as_f64().unwrap_or_default();
-                let out =
-                    minimum.is_some_and(|m| x < m) || maximum.is_some_and(|m| x > m) || above.is_some_and(|m| x <= m);
-                if out {
-                    return wrong(self, &range("a number", *minimum, *maximum, *above));
+                let low = minimum.is_some_and(|m| x < m) || above.is_some_and(|m| x <= m);
+                if low || maximum.is_some_and(|m| x > m) || below.is_some_and(|m| x >= m) {
+                    return wrong(self, &range("a number", [*minimum, *maximum], [*above, *below]));
                 }
                 Some(Value::from(x))
             }
-            (SettingType::Number { minimum, maximum, above }, _) => {
-                wrong(self, &range("a number", *minimum, *maximum, *above))
+            (SettingType::Number { minimum, maximum, above, below }, _) => {
+                wrong(self, &range("a number", [*minimum, *maximum], [*above, *below]))
             }
             (SettingType::Numbers(count), What::List(items)) => {
                 let number = |n: &Node| match &n.what {
@@ -170,12 +169,12 @@ fn numbers(count: Option<usize>) -> String {
     count.map_or("a list of numbers".into(), |n| format!("a list of {n} numbers"))
 }
 
-fn range(what: &str, minimum: Option<f64>, maximum: Option<f64>, above: Option<f64>) -> String {
-    let mut out = what.to_owned();
-    let low = above.map(|a| format!("above {a}")).or(minimum.map(|m| format!("from {m}")));
-    low.iter().for_each(|l| out += &format!(" {l}"));
-    maximum.iter().for_each(|m| out += &format!(" up to {m}"));
-    out
+/// A range in words: its ends, and those that are no part of it.
+fn range(what: &str, [minimum, maximum]: [Option<f64>; 2], [above, below]: [Option<f64>; 2]) -> String {
+    let low = above.map(|a| format!(" above {a}")).or(minimum.map(|m| format!(" from {m}")));
+    let high = below.map(|b| format!(" below {b}")).or(maximum.map(|m| format!(" up to {m}")));
+    let join = if above.is_some() && below.is_some() { " and" } else { "" };
+    format!("{what}{}{join}{}", low.unwrap_or_default(), high.unwrap_or_default())
 }
 
 fn placed(mut node: Node, at: &At) -> Node {

@@ -91,6 +91,7 @@ pub fn frame(reference: &Rendered, candidate: &Rendered, metrics: Metrics) -> Fr
 pub fn summary(frames: &[FrameErrors], changes: &[Change]) -> ErrorSummary {
     let pooled = frames.iter().fold(SquaredError::default(), |s, f| s.joined(f.luminance));
     let of = |pick: fn(&FrameErrors) -> Option<f64>| -> Option<Vec<f64>> { frames.iter().map(pick).collect() };
+    let some = |values: Vec<f64>| (!values.is_empty()).then(|| MeanMax::of(values));
     ErrorSummary {
         frames: frames.len(),
         equal_frames: frames.iter().filter(|f| f.luminance.sum == 0.0).count(),
@@ -102,12 +103,12 @@ pub fn summary(frames: &[FrameErrors], changes: &[Change]) -> ErrorSummary {
         ssim: of(|f| f.ssim).filter(|v| !v.is_empty()).map(MeanMin::of),
         flip: of(|f| f.flip).filter(|v| !v.is_empty()).map(MeanMax::of),
         hole_fraction: MeanMax::of(frames.iter().map(|f| f.hole_fraction)),
-        depth_off_fraction: MeanMax::of(frames.iter().map(|f| f.depth_off_fraction)),
+        depth_off_fraction: some(frames.iter().map(|f| f.depth_off_fraction).collect()),
         frame_pairs: changes.len(),
-        temporal_change_grey_levels: MeanMax::of(changes.iter().map(|c| c.grey_levels)),
+        temporal_change_grey_levels: some(changes.iter().map(|c| c.grey_levels).collect()),
         frame_pairs_at_borders: changes.iter().filter(|c| c.at_border).count(),
-        temporal_change_at_borders_grey_levels: MeanMax::of(
-            changes.iter().filter(|c| c.at_border).map(|c| c.grey_levels),
+        temporal_change_at_borders_grey_levels: some(
+            changes.iter().filter(|c| c.at_border).map(|c| c.grey_levels).collect(),
         ),
     }
 }
@@ -184,8 +185,9 @@ mod tests {
         let change = |grey_levels: f64, at_border: bool| Change { grey_levels, at_border };
         let s = summary(&[], &[change(1.0, false), change(5.0, true), change(3.0, true), change(1.0, false)]);
         assert_eq!((s.frame_pairs, s.frame_pairs_at_borders), (4, 2));
-        assert_eq!(s.temporal_change_grey_levels, MeanMax { mean: 2.5, max: 5.0 });
-        assert_eq!(s.temporal_change_at_borders_grey_levels, MeanMax { mean: 4.0, max: 5.0 });
+        assert_eq!(s.temporal_change_grey_levels, Some(MeanMax { mean: 2.5, max: 5.0 }));
+        assert_eq!(s.temporal_change_at_borders_grey_levels, Some(MeanMax { mean: 4.0, max: 5.0 }));
+        assert_eq!(summary(&[], &[]).depth_off_fraction, None, "what is not measured is not said to be perfect");
     }
 
     #[test]

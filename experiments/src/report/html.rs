@@ -37,12 +37,9 @@ pub(super) fn row(name: &str, p: &PipelineSummary) -> Vec<String> {
         or_dash(e.and_then(|e| e.ssim).map(|s| format!("{:.4}", s.mean))),
         or_dash(e.and_then(|e| e.flip).map(|f| format!("{:.4}", f.mean))),
         or_dash(e.map(|e| format!("{:.4}", 100.0 * e.hole_fraction.mean))),
-        or_dash(e.map(|e| format!("{:.4}", 100.0 * e.depth_off_fraction.mean))),
-        or_dash(e.filter(|e| e.frame_pairs > 0).map(|e| format!("{:.3}", e.temporal_change_grey_levels.mean))),
-        or_dash(
-            e.filter(|e| e.frame_pairs_at_borders > 0)
-                .map(|e| format!("{:.3}", e.temporal_change_at_borders_grey_levels.mean)),
-        ),
+        or_dash(e.and_then(|e| e.depth_off_fraction).map(|d| format!("{:.4}", 100.0 * d.mean))),
+        or_dash(e.and_then(|e| e.temporal_change_grey_levels).map(|c| format!("{:.3}", c.mean))),
+        or_dash(e.and_then(|e| e.temporal_change_at_borders_grey_levels).map(|c| format!("{:.3}", c.mean))),
         format!("{:.1}", p.preprocess.bytes_stored as f64 / 1e6),
     ]
 }

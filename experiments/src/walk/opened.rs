@@ -147,18 +147,17 @@ impl<'a> Opened<'a> {
         Some((cell, self.division.cells.active(cell, camera)))
     }
 
-    fn with_view<R>(&self, id: CellId, camera: &Camera, f: impl FnOnce(&dyn FarView, &View<'_>) -> R) -> Option<R> {
+    fn with_view<R>(
+        &self,
+        id: CellId,
+        camera: &Camera,
+        budget: DrawBudget,
+        f: impl FnOnce(&dyn FarView, &View<'_>) -> R,
+    ) -> Option<R> {
         let ((cell, at), far) = (self.active(id, camera)?, self.views.get(&id)?);
         // Half a pixel, at a box's nearest point: tolerance = distance / (2 px_per_tan).
         let half_px = |b: &Aabb| 0.5 * b.distance(camera.eye.as_vec3()) / camera.px_per_tan();
-        let view = View {
-            scene: self.scene,
-            camera,
-            at: &at,
-            tolerance: &half_px,
-            budget: DrawBudget::default(),
-            cell: Some(cell),
-        };
+        let view = View { scene: self.scene, camera, at: &at, tolerance: &half_px, budget, cell: Some(cell) };
         Some(f(&**far, &view))
     }
 
@@ -184,7 +183,9 @@ impl<'a> Opened<'a> {
             draws.push(Draw { what: DrawWhat::Chunks(there), bounds: self.scene.bounds, error_px: 0.0 });
         }
         if let Some(id) = cell {
-            let achieved = self.with_view(id, camera, |far, view| far.draw(resident, view, &mut draws).missing);
+            let achieved = self.with_view(id, camera, self.pipeline.far_field.draw_budget(), |far, view| {
+                far.draw(resident, view, &mut draws).missing
+            });
             // A cell that is not built yet lacks what its windows show, or all of it.
             let windows = || self.active(id, camera).map_or(0, |(_, at)| at.sectors.len() as u32);
             let everything = u32::from(self.built.covers == Covers::Everything);
@@ -193,10 +194,10 @@ impl<'a> Opened<'a> {
         Drawn { cell, draws, missing }
     }
 
-    /// What a cell's far field alone draws, all of it resident.
+    /// What a cell's far field alone draws, all of it resident and cut short by no budget.
     pub fn far_draws(&self, cell: CellId, camera: &Camera) -> Vec<Draw> {
         let mut draws = vec![];
-        self.with_view(cell, camera, |far, view| far.draw(&|_| true, view, &mut draws));
+        self.with_view(cell, camera, DrawBudget::default(), |far, view| far.draw(&|_| true, view, &mut draws));
         draws
     }
 
@@ -280,7 +281,8 @@ impl Demand for Wants<'_> {
     }
 
     fn of(&self, cell: CellId, from: &Camera, out: &mut Vec<Candidate>) {
-        let built = self.opened.with_view(cell, from, |far, view| far.wanted(view, out));
+        let budget = self.opened.pipeline.far_field.draw_budget();
+        let built = self.opened.with_view(cell, from, budget, |far, view| far.wanted(view, out));
         if let (None, Some(asked)) = (built, &self.asked) {
             asked.borrow_mut().push(cell);
         }

@@ -21,6 +21,9 @@ use crate::simplify::{Extremes, Limits, Simplified, simplify};
 use crate::texels::{Patch, patches, write};
 use crate::tree::Tree;
 
+/// Layers that every device's textures may have.
+const MAX_LAYERS: u32 = 256;
+
 /// Projectors that a part's triangles may name: one bit each.
 const PROJECTORS: usize = 32;
 
@@ -154,7 +157,12 @@ fn cube(
     let cameras: Vec<Camera> = p.views().iter().map(|v| v.0).collect();
     let patches = patches(&cameras, mesh);
     let sizes: Vec<[u32; 2]> = patches.iter().map(|p| [p.rect[2], p.rect[3]]).collect();
-    let packing = pack(&[sizes], making.atlas_px, u32::MAX)?;
+    let mut side = making.atlas_px;
+    let mut packing = pack(std::slice::from_ref(&sizes), side, u32::MAX)?;
+    while packing.atlases[0].1 > MAX_LAYERS && side < 16384 {
+        side *= 2;
+        packing = pack(std::slice::from_ref(&sizes), side, u32::MAX)?;
+    }
     let slots = &packing.slots[0];
     // No larger than what is used of it.
     let used = |k: usize| slots.iter().map(|s| s.rect[k] + s.rect[k + 2]).max().unwrap_or(1);

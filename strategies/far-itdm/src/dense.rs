@@ -56,6 +56,19 @@ impl Dense {
         *id
     }
 
+    /// For each vertex whether more than two of its edges are open: two borders meet there in a point, and neither may take it along.
+    pub(crate) fn knots(&self) -> Vec<bool> {
+        let edges = || self.indices.as_chunks::<3>().0.iter().flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
+        let mut all: Vec<[u32; 2]> = edges().collect();
+        all.sort_unstable();
+        let mut open = vec![0u8; self.positions.len()];
+        for [a, b] in edges().filter(|[a, b]| all.binary_search(&[*b, *a]).is_err()) {
+            open[a as usize] = open[a as usize].saturating_add(1);
+            open[b as usize] = open[b as usize].saturating_add(1);
+        }
+        open.into_iter().map(|n| n > 2).collect()
+    }
+
     pub(crate) fn triangles(&self) -> usize {
         self.views.len()
     }

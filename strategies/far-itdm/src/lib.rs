@@ -53,7 +53,7 @@ const INCREMENTAL: &str = "incremental-tdm";
 const PLAIN: &str = "textured-depth-mesh";
 
 /// 2: cubes of nothing have boxes that can be read back; what turns away mends nothing.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// Incremental textured depth meshes.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
@@ -191,6 +191,11 @@ mod defaults {
     }
 }
 
+/// Pixels of a face as a tangent: a face spans two.
+fn error_tan(px: f32, face_px: u32) -> f32 {
+    2.0 * px / face_px as f32
+}
+
 /// Refuses settings that contradict what they mean.
 fn check(who: &str, sizes: &[(&str, u32)], atlas_px: u32, at_least_zero: &[(&str, f32)]) -> Result<(), Fault> {
     if let Some((name, v)) = sizes.iter().find(|(_, v)| !(8..=4096).contains(v)) {
@@ -237,11 +242,13 @@ impl IncrementalTdm {
         ];
         let sizes = [("face_px", self.face_px), ("sampling_px", self.sampling_px)];
         check(INCREMENTAL, &sizes, self.atlas_px, &numbers)?;
-        if self.alpha_deg > 90.0 || self.max_samples == 0 {
-            return Err(Fault::Refused(format!(
-                "{INCREMENTAL}: alpha_deg = {} is at most 90, max_samples = {} at least 1",
-                self.alpha_deg, self.max_samples
-            )));
+        if self.alpha_deg > 90.0 || self.far == Some(0.0) {
+            let (a, f) = (self.alpha_deg, self.far.unwrap_or_default());
+            return Err(Fault::Refused(format!("{INCREMENTAL}: alpha_deg = {a} is at most 90, far = {f} above 0")));
+        }
+        if self.max_samples == 0 || self.scan_budget == Some(0) || self.triangle_budget == Some(0) {
+            let what = "max_samples, scan_budget and triangle_budget are at least 1";
+            return Err(Fault::Refused(format!("{INCREMENTAL}: {what}")));
         }
         Ok(())
     }
@@ -283,15 +290,15 @@ impl FarField for IncrementalTdm {
             if chosen.verdict.quantity == Quantity::UnseenSolidAngle {
                 unseen = Some(chosen.verdict.claim.max(unseen.unwrap_or(0.0)));
             }
-            if !chosen.verdict.passes && chosen.eyes.len() >= self.max_samples as usize {
+            if !chosen.verdict.passes {
                 let (n, v) = (chosen.eyes.len(), chosen.verdict);
-                let reason = format!("max_samples = {n} leaves {} = {:.3}", v.quantity.name(), v.value);
+                let why = if n >= self.max_samples as usize { "max_samples" } else { "its metric asks for no more" };
+                let reason = format!("{n} samples ({why}) leave {} = {:.3}", v.quantity.name(), v.value);
                 out.left_out(LeftOut { stage: "samples".into(), reason, decided: "build".into() });
             }
             bake(&making, job, (i as u32, &split.far), &chosen.eyes, &mut index, out, cx)?;
         }
-        // A budget may leave out what was sampled.
-        if let Some(max) = unseen.filter(|_| self.scan_budget.is_none() && self.triangle_budget.is_none()) {
+        if let Some(max) = unseen {
             out.claim(Claim { quantity: Quantity::UnseenSolidAngle, payload: None, max });
         }
         index.encode()
@@ -299,8 +306,20 @@ impl FarField for IncrementalTdm {
 
     fn open(&self, _shared: Option<(AssetId, &[u8])>, cell: (AssetId, &[u8])) -> Result<Box<dyn FarView>, Fault> {
         let index = Index::decode(&format!("index of asset {}", cell.0.0), cell.1)?;
-        let budget = DrawBudget { payloads: self.scan_budget, triangles: self.triangle_budget };
-        Ok(Box::new(view::Cubes { asset: cell.0, index, budget, error_px: self.border_px.max(self.interior_px) }))
+        Ok(Box::new(view::Cubes {
+            asset: cell.0,
+            index,
+            most: None,
+            error_tan: error_tan(self.border_px.max(self.interior_px), self.face_px),
+        }))
+    }
+
+    fn draw_budget(&self) -> DrawBudget {
+        DrawBudget { payloads: self.scan_budget, triangles: self.triangle_budget }
+    }
+
+    fn frame_settings(&self) -> &'static [&'static str] {
+        &["scan_budget", "triangle_budget"]
     }
 
     fn version(&self) -> u32 {
@@ -341,8 +360,12 @@ impl FarField for TexturedDepthMesh {
 
     fn open(&self, _shared: Option<(AssetId, &[u8])>, cell: (AssetId, &[u8])) -> Result<Box<dyn FarView>, Fault> {
         let index = Index::decode(&format!("index of asset {}", cell.0.0), cell.1)?;
-        let budget = DrawBudget { payloads: Some(1), triangles: None };
-        Ok(Box::new(view::Cubes { asset: cell.0, index, budget, error_px: self.border_px.max(self.interior_px) }))
+        Ok(Box::new(view::Cubes {
+            asset: cell.0,
+            index,
+            most: Some(1),
+            error_tan: error_tan(self.border_px.max(self.interior_px), self.face_px),
+        }))
     }
 
     fn version(&self) -> u32 {

@@ -36,13 +36,17 @@ pub(crate) fn first(cell: &Cell, corners: Corners) -> Result<Vec<DVec3>, Fault> 
         }
     };
     let all = solid.ok_or_else(|| Fault::Refused(format!("cell {} has no corners to sample from", outline.id.0)))?;
+    Ok(each_once(all.into_iter().map(|p| outline.region.brought_in(p))))
+}
+
+fn each_once(places: impl IntoIterator<Item = Vec3>) -> Vec<DVec3> {
     let mut out: Vec<DVec3> = vec![];
-    for p in all.into_iter().map(Vec3::as_dvec3) {
+    for p in places.into_iter().map(Vec3::as_dvec3) {
         if !out.contains(&p) {
             out.push(p);
         }
     }
-    Ok(out)
+    out
 }
 
 /// Viewpoints on a uniform grid of `n` x `n` over the region's outline, at the height of its centre: the middles of the grid's fields
@@ -55,6 +59,6 @@ pub(crate) fn grid(cell: &Cell, n: u32) -> Vec<DVec3> {
         let t = Vec3::new((i % n) as f32 + 0.5, 0.0, (i / n) as f32 + 0.5) / n as f32;
         bounds.min + bounds.size() * t
     };
-    let inside: Vec<DVec3> = (0..n * n).map(at).filter(|p| outline.region.contains(*p)).map(Vec3::as_dvec3).collect();
+    let inside = each_once((0..n * n).map(at).filter(|p| outline.region.contains(*p)));
     if inside.is_empty() { vec![outline.centre.as_dvec3()] } else { inside }
 }

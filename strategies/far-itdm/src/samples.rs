@@ -7,7 +7,7 @@
 use farfield_core::cell::Cell;
 use farfield_core::context::{Context, Shot, collect};
 use farfield_core::image::SurfaceImage;
-use farfield_core::panorama::{Joined, Panorama, SkinTests};
+use farfield_core::panorama::{Joined, Panorama, SkinTests, spread};
 use farfield_core::scene::ChunkSet;
 use farfield_core::strategy::{CellJob, Subject, Verdict, VisibilityMetric};
 use farfield_core::{Aabb, Camera, Fault};
@@ -76,7 +76,7 @@ pub(crate) fn choose(own: &Sampling<'_>, job: &CellJob<'_>, far: &ChunkSet, cx: 
     let mut eyes = own.first.clone();
     let mut samples = take(&eyes, far, own.face_px, job.views.near, cx)?;
     loop {
-        let facing = points(&samples);
+        let facing = spread(&samples, FACING);
         let subject = subject(job, bounds, &facing, &samples);
         let next = if eyes.len() < own.max_samples { own.metric.next(&subject, cx)? } else { None };
         match next.map(Vec3::as_dvec3).filter(|p| !eyes.contains(p)) {
@@ -97,19 +97,4 @@ fn subject<'a>(
 ) -> Subject<'a> {
     let cell: &'a Cell = job.cell;
     Subject { cell, views: job.views, bounds, facing, px_per_tan: job.views.px_per_tan(), samples }
-}
-
-/// Points of what samples see, spread over all of them, local frame.
-fn points(samples: &[(Camera, SurfaceImage)]) -> Vec<Vec3> {
-    let pixels: usize = samples.iter().map(|s| s.1.depth.len()).sum();
-    let every = pixels.div_ceil(FACING).max(1);
-    let of = |(c, image): &(Camera, SurfaceImage)| -> Vec<Vec3> {
-        let point = |i: usize| {
-            let (x, y) = (i as u32 % c.size[0], i as u32 / c.size[0]);
-            let ray = c.ray(x as f32 + 0.5, y as f32 + 0.5).as_dvec3();
-            (c.eye + ray * f64::from(image.depth[i])).as_vec3()
-        };
-        (0..image.depth.len()).step_by(every).filter(|&i| image.hit(i)).map(point).collect()
-    };
-    samples.iter().flat_map(of).collect()
 }

@@ -8,7 +8,7 @@
 use farfield_core::cell::Cell;
 use farfield_core::draw::{Draw, DrawWhat};
 use farfield_core::id::{AssetId, Block, LocalPayload, PayloadRef, SplitId};
-use farfield_core::strategy::{Achieved, Candidate, DrawBudget, FarView, View};
+use farfield_core::strategy::{Achieved, Candidate, FarView, View};
 use glam::DVec3;
 
 use crate::index::{Cube, Index};
@@ -17,10 +17,10 @@ use crate::index::{Cube, Index};
 pub(crate) struct Cubes {
     pub(crate) asset: AssetId,
     pub(crate) index: Index,
-    /// The settings' budget; a view may have a lower one.
-    pub(crate) budget: DrawBudget,
-    /// Pixels that surfaces may be off by.
-    pub(crate) error_px: f32,
+    /// The most cubes that make a picture, whatever the view's budget: of samples that keep their skins the nearest alone.
+    pub(crate) most: Option<u64>,
+    /// How far surfaces may be off, as a tangent seen from the region's corners and from their sample.
+    pub(crate) error_tan: f32,
 }
 
 impl Cubes {
@@ -51,9 +51,8 @@ impl Cubes {
 
     /// How many of the cubes in order the budgets allow.
     fn within_budget(&self, order: &[usize], view: &View<'_>) -> usize {
-        let least = |a: Option<u64>, b: Option<u64>| a.into_iter().chain(b).min().unwrap_or(u64::MAX);
-        let most_cubes = least(self.budget.payloads.map(u64::from), view.budget.payloads.map(u64::from));
-        let most_triangles = least(self.budget.triangles, view.budget.triangles);
+        let most_cubes = self.most.into_iter().chain(view.budget.payloads.map(u64::from)).min().unwrap_or(u64::MAX);
+        let most_triangles = view.budget.triangles.unwrap_or(u64::MAX);
         let mut triangles = 0;
         let fits = |&(n, cube): &(usize, &usize)| {
             triangles += in_view(&self.index.cubes[*cube], view).map(|p| p.triangles).sum::<u64>();
@@ -96,11 +95,12 @@ impl FarView for Cubes {
                 achieved.missing += 1;
                 continue;
             }
-            achieved.error_px = self.error_px;
+            let error_px = self.error_tan * view.camera.px_per_tan();
+            achieved.error_px = error_px;
             out.extend(in_view(c, view).map(|p| Draw {
                 what: DrawWhat::Payload { id, part: p.part, object: c.object },
                 bounds: p.bounds,
-                error_px: self.error_px,
+                error_px,
             }));
         }
         achieved
@@ -120,6 +120,7 @@ mod tests {
     use farfield_core::mesh::TriangleMesh;
     use farfield_core::region::Region;
     use farfield_core::scene::{Material, Placement, Scene, SceneBuilder};
+    use farfield_core::strategy::DrawBudget;
     use farfield_core::{Aabb, Camera};
     use glam::{DAffine3, Vec3};
 
@@ -139,7 +140,7 @@ mod tests {
 
     /// Five samples along x: 2 is the root, 1 and 3 its children, 0 and 4 theirs. Each has ten triangles ahead and a hundred
     /// behind. Cubes stand in the order of the tree.
-    fn cubes(payloads: Option<u32>, triangles: Option<u64>) -> Cubes {
+    fn cubes() -> Cubes {
         let piece = |part: u16, z: f32, triangles: u64| Piece {
             part,
             triangles,
@@ -162,15 +163,16 @@ mod tests {
         };
         let parts = [(2.0, None), (1.0, Some(0)), (3.0, Some(0)), (0.0, Some(1)), (4.0, Some(2))];
         let cubes = parts.iter().enumerate().map(|(i, (x, p))| cube(i as u32, *x, *p)).collect();
-        Cubes { asset: AssetId(7), index: Index { cubes }, budget: DrawBudget { payloads, triangles }, error_px: 0.5 }
+        Cubes { asset: AssetId(7), index: Index { cubes }, most: None, error_tan: 0.01 }
     }
 
     /// The payloads drawn from an eye at x looking along -z, in order; whether a budget was hit; what is missing.
-    fn drawn(far: &Cubes, x: f64, resident: impl Fn(u32) -> bool) -> (Vec<u32>, bool, u32) {
+    fn drawn(budget: (Option<u32>, Option<u64>), x: f64, resident: impl Fn(u32) -> bool) -> (Vec<u32>, bool, u32) {
         let scene = scene();
         let camera = Camera::looking(DVec3::new(x, 0.0, 0.0), -Vec3::Z, Vec3::Y, 1.0, [8, 8], 0.1);
         let at = Active { cell: CellId(0), split: SplitId(0), sectors: vec![] };
-        let budget = DrawBudget::default();
+        let budget = DrawBudget { payloads: budget.0, triangles: budget.1 };
+        let far = cubes();
         let view = View { scene: &scene, camera: &camera, at: &at, tolerance: &|_| 0.0, budget, cell: None };
         let (mut draws, mut wanted) = (vec![], vec![]);
         let there = |b: Block| matches!(b, Block::Payload(p) if resident(p.id.0));
@@ -189,31 +191,31 @@ mod tests {
 
     #[test]
     fn the_nearest_sample_comes_with_its_ancestors_and_then_the_next_nearest() {
-        assert_eq!(drawn(&cubes(None, None), 3.9, |_| true), (vec![0, 2, 4, 1, 3], false, 0));
-        assert_eq!(drawn(&cubes(None, None), 1.9, |_| true), (vec![0, 1, 2, 3, 4], false, 0));
+        assert_eq!(drawn((None, None), 3.9, |_| true), (vec![0, 2, 4, 1, 3], false, 0));
+        assert_eq!(drawn((None, None), 1.9, |_| true), (vec![0, 1, 2, 3, 4], false, 0));
     }
 
     #[test]
     fn a_budget_of_cubes_cuts_a_line_of_ancestors_from_its_end() {
-        assert_eq!(drawn(&cubes(Some(3), None), 3.9, |_| true), (vec![0, 2, 4], true, 0));
-        assert_eq!(drawn(&cubes(Some(2), None), 3.9, |_| true), (vec![0, 2], true, 0));
-        assert!(!drawn(&cubes(Some(5), None), 3.9, |_| true).1);
+        assert_eq!(drawn((Some(3), None), 3.9, |_| true), (vec![0, 2, 4], true, 0));
+        assert_eq!(drawn((Some(2), None), 3.9, |_| true), (vec![0, 2], true, 0));
+        assert!(!drawn((Some(5), None), 3.9, |_| true).1);
     }
 
     #[test]
     fn a_budget_of_triangles_counts_those_within_the_frustum() {
-        assert_eq!(drawn(&cubes(None, Some(39)), 3.9, |_| true), (vec![0, 2, 4], true, 0));
-        assert_eq!(drawn(&cubes(None, Some(9)), 3.9, |_| true), (vec![], true, 0));
+        assert_eq!(drawn((None, Some(39)), 3.9, |_| true), (vec![0, 2, 4], true, 0));
+        assert_eq!(drawn((None, Some(9)), 3.9, |_| true), (vec![], true, 0));
     }
 
     #[test]
     fn a_cube_that_is_not_there_is_counted() {
-        assert_eq!(drawn(&cubes(None, None), 3.9, |id| id != 2), (vec![0, 4, 1, 3], false, 1));
+        assert_eq!(drawn((None, None), 3.9, |id| id != 2), (vec![0, 4, 1, 3], false, 1));
     }
 
     #[test]
     fn viewpoints_are_the_samples_places_split_by_split() {
-        let mut far = cubes(None, None);
+        let mut far = cubes();
         far.index.cubes[3].split = 1;
         let outline = Outline { id: CellId(0), region: Region::Everywhere, centre: Vec3::ZERO, neighbours: vec![] };
         let cell = Cell { outline, splits: vec![], sectors: vec![], own: vec![], claims: vec![] };

@@ -18,6 +18,7 @@ use farfield_core::cell::{Cell, Outline, Sector};
 use farfield_core::context::Context;
 use farfield_core::id::SplitId;
 use farfield_core::image::SurfaceImage;
+use farfield_core::panorama::spread;
 use farfield_core::region::Region;
 use farfield_core::scene::ChunkSet;
 use farfield_core::strategy::{CellJob, Subject, VisibilityMetric};
@@ -60,7 +61,14 @@ impl<'a> Enough<'a> {
             claims: vec![],
         };
         let bounds = seen.iter().fold(Aabb::EMPTY, |b, c| b.union(job.scene.chunks[c.index()].bounds));
-        Self { metric, job, cell, bounds, facing: points(&central), samples: vec![central] }
+        Self {
+            metric,
+            job,
+            cell,
+            bounds,
+            facing: spread(std::slice::from_ref(&central), FACING),
+            samples: vec![central],
+        }
     }
 
     /// Adds a picture.
@@ -80,17 +88,6 @@ impl<'a> Enough<'a> {
         };
         Ok(self.metric.judge(&subject, cx)?.passes)
     }
-}
-
-/// Points that a picture shows, spread over all of it, local frame.
-fn points((camera, image): &(Camera, SurfaceImage)) -> Vec<Vec3> {
-    let every = image.depth.len().div_ceil(FACING).max(1);
-    let point = |i: usize| {
-        let (x, y) = (i as u32 % camera.size[0], i as u32 / camera.size[0]);
-        let ray = camera.ray(x as f32 + 0.5, y as f32 + 0.5).as_dvec3();
-        (camera.eye + ray * f64::from(image.depth[i])).as_vec3()
-    };
-    (0..image.depth.len()).step_by(every).filter(|&i| image.hit(i)).map(point).collect()
 }
 
 /// The smallest upright prism that holds points; their box where the prism has no floor.

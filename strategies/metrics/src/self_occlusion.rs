@@ -52,7 +52,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::candidates::{half_spaces, solid};
-use crate::void_surface::{eyes, within};
+use crate::void_surface::eyes;
 
 /// Self-occlusion under a number of pixels.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -108,7 +108,7 @@ impl VisibilityMetric for SelfOcclusion {
             return Ok(Some(subject.cell.outline.centre));
         }
         let region = &subject.cell.outline.region;
-        let places = solid(&half_spaces(region), &eyes).into_iter().map(|p| within(region, p.as_vec3()));
+        let places = solid(&half_spaces(region), &eyes).into_iter().map(|p| region.brought_in(p.as_vec3()));
         let farther = |best: Option<(Vec3, f64)>, p: Vec3| {
             let d = from_nearest(p.as_dvec3(), &eyes);
             // Of equal ones the first; a sample, after rounding, is none.

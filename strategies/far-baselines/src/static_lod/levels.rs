@@ -17,6 +17,7 @@ use glam::Vec3;
 use super::StaticLod;
 use super::deviation::Original;
 use super::gather::{Source, Wedge};
+use super::index::MOST_LEVELS;
 
 /// A level of detail.
 pub(super) struct Level {
@@ -47,7 +48,8 @@ pub(super) fn levels(
     let original = Original::new(source, textures);
     let wedges = wedges_of(source);
     let (mut two_sided, mut quadrics) = (source.two_sided.clone(), None);
-    while target(corners.len()) >= own.least_triangles as usize {
+    // A chain may end early: ids of levels are counted to a bound.
+    while target(corners.len()) >= own.least_triangles as usize && out.len() < MOST_LEVELS as usize {
         cx.check()?;
         let indices: Vec<u32> = corners.iter().flat_map(|&c| source.vertices(c)).collect();
         let live = LiveMesh::new(&source.positions, &indices, &[])?;

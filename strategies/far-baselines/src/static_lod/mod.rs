@@ -158,6 +158,10 @@ impl FarField for StaticLod {
         })
     }
 
+    fn frame_settings(&self) -> &'static [&'static str] {
+        &["max_px"]
+    }
+
     fn bake_scene(&self, job: &SceneJob<'_>, out: &dyn Sink, cx: &Context<'_>) -> Result<Vec<u8>, Fault> {
         self.check()?;
         let one = |i: usize| self.bake(job, i as u32, out, cx);

@@ -11,6 +11,9 @@
 //! engine again with the tree's merges as its only edges, so that no merge folds a triangle that the first run found flat;
 //! on the edges of the cube vertices slide along the edge alone, so that every triangle stays in the picture that textures it.
 //!
+//! At borders the distance is that of every vertex that went from the border that is left. Elsewhere it is the quadric error, a root mean
+//! square over the planes of what was merged: an estimate and no bound, at silhouettes too.
+//!
 //! O(n log n) for n triangles, each phase.
 
 mod cut;
@@ -54,12 +57,13 @@ pub(crate) struct Simplified {
 /// # Errors
 /// [`Fault::Data`] where there are too many triangles for the engine.
 pub(crate) fn simplify(mesh: &Dense, extremes: &Extremes, limits: &Limits) -> Result<Simplified, Fault> {
-    let live = LiveMesh::new(&mesh.positions, &mesh.indices, &[])?;
+    let knots = mesh.knots();
+    let live = LiveMesh::new(&mesh.positions, &mesh.indices, &knots)?;
     let mut tree = Tree::new(&live, mesh, extremes);
     let few = Settings { min_triangles: limits.tree_triangles as usize, ..Settings::default() };
     collapse(live, &mut tree, &few);
     let silhouette = extremes.silhouettes(mesh);
-    let live = LiveMesh::new(&mesh.positions, &mesh.indices, &[])?;
+    let live = LiveMesh::new(&mesh.positions, &mesh.indices, &knots)?;
     let mut cut = Cut::new(tree.merges, &live, &silhouette, limits);
     let done = collapse(live, &mut cut, &Settings::default());
     let mut new = vec![u32::MAX; mesh.positions.len()];

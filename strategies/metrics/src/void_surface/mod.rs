@@ -78,7 +78,7 @@ pub struct VoidSurface {
     pub alpha_deg: f32,
     /// An edge that reaches farther is a skin; by default none is for that.
     #[serde(default)]
-    #[schemars(range(min = 0.0), extend("unit" = "scene units"))]
+    #[schemars(extend("unit" = "scene units", "exclusiveMinimum" = 0.0))]
     pub far: Option<f32>,
     /// Edge of the six pictures in which the void is counted; where the subject fits one picture, that one's longer edge.
     #[serde(default = "faces")]
@@ -107,6 +107,9 @@ impl Default for VoidSurface {
     }
 }
 
+/// Heights that differ by less than this share of what is seen are one: rounding of 32-bit positions.
+const LEVEL: f32 = 1e-6;
+
 /// The most void there can be: all around.
 const ALL_SR: f64 = 4.0 * std::f64::consts::PI;
 
@@ -131,14 +134,18 @@ impl VoidSurface {
                 )));
             }
             (region, Candidates::Planar) => {
-                let flat: Vec<DVec2> = eyes.iter().map(|e| DVec2::new(e.x, e.z)).collect();
+                // A sample above or below a place does not stand there.
+                let b = subject.bounds.union(Aabb::of(eyes.iter().map(|e| e.as_vec3())));
+                let level = f64::from(LEVEL * b.size().max_element());
+                let beside = |e: &&DVec3| (e.y - f64::from(outline.centre.y)).abs() <= level;
+                let flat: Vec<DVec2> = eyes.iter().filter(beside).map(|e| DVec2::new(e.x, e.z)).collect();
                 let up = |p: DVec2| Vec3::new(p.x as f32, outline.centre.y, p.y as f32);
                 planar(&region.footprint(), &flat).into_iter().map(up).collect()
             }
             (region, Candidates::Solid) => solid(&half_spaces(region), &eyes).into_iter().map(DVec3::as_vec3).collect(),
         };
         let mut places = vec![];
-        for p in found.into_iter().map(|p| within(&outline.region, p)) {
+        for p in found.into_iter().map(|p| outline.region.brought_in(p)) {
             if !places.contains(&p) && !eyes.contains(&p.as_dvec3()) {
                 places.push(p);
             }
@@ -213,14 +220,6 @@ const FINE: f32 = (1u32 << 20) as f32;
 /// Where the samples were taken.
 pub(crate) fn eyes(subject: &Subject<'_>) -> Vec<DVec3> {
     subject.samples.chunk_by(|a, b| a.0.eye == b.0.eye).map(|views| views[0].0.eye).collect()
-}
-
-/// Candidates of a ball lie on planes around it.
-pub(crate) fn within(region: &Region, p: Vec3) -> Vec3 {
-    match region {
-        Region::Sphere { centre, radius } => *centre + (p - *centre).clamp_length_max(*radius),
-        _ => p,
-    }
 }
 
 #[typetag::serde(name = "void-surface")]
