@@ -10,7 +10,7 @@
 //!   --sampling-px N, --most N (samples), --set KEY=JSON (of the far field)
 //! ```
 //!
-//! Regions are those that the scene's own route visits, spread evenly over it.
+//! What a mode does not need it ignores: `samples` and `truth` build no meshes. Regions are those that the scene's own route visits, spread evenly over it.
 
 use std::path::Path;
 use std::sync::Mutex;
@@ -441,9 +441,10 @@ fn main() -> Result<(), Error> {
         "table" => table(&a),
         "truth" => truth(&a),
         "growth" => growth(&a),
-        _ => {
+        "" => {
             println!("modes: samples, table, truth, growth");
             Ok(())
         }
+        other => Err(format!("no mode {other}: samples, table, truth, growth").into()),
     }
 }

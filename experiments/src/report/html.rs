@@ -8,6 +8,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use farfield_core::image::Picture;
 
+use super::equal;
 use super::plot::{Point, by_frame, error_against_time};
 use super::{COLUMNS, Shown};
 use crate::results::{FrameRow, PipelineSummary, Summary};
@@ -69,6 +70,7 @@ pub(super) fn run(s: &Summary, frames: &[FrameRow], gallery: &[Shown]) -> io::Re
           projection, on the same device in the same run.</p>";
     pipelines(&mut h, &[(String::new(), s)]);
     push(&mut h, format_args!("<p class=note>Means: {}.</p>", text(&s.equal_frames_note)));
+    equal_quality(&mut h, &s.pipelines);
     let times = s.pipelines.iter().filter(|p| p.device.backend == "cpu").map(|p| text(&p.name)).collect::<Vec<_>>();
     if !times.is_empty() {
         push(
@@ -167,6 +169,29 @@ fn pipelines(h: &mut String, runs: &[(String, &Summary)]) {
         }
     }
     *h += "</table>";
+}
+
+/// What a pipeline costs over each swept one at the same quality.
+fn equal_quality(h: &mut String, pipelines: &[PipelineSummary]) {
+    let ratios = equal::ratios(pipelines);
+    if ratios.is_empty() {
+        return;
+    }
+    *h += "<h2>At equal quality</h2><table><tr><th>pipeline</th><th>over</th><th>at PSNR-Y dB</th>";
+    equal::COSTS.iter().for_each(|c| push(h, format_args!("<th>{c}</th>")));
+    *h += "</tr>";
+    for r in ratios {
+        push(
+            h,
+            format_args!("<tr><td>{}</td><td class=t>{}</td><td>{:.2}</td>", text(&r.name), text(&r.curve), r.psnr_y_db),
+        );
+        for c in r.cost {
+            push(h, format_args!("<td>{}</td>", c.map_or("-".into(), |c| format!("{c:.2}"))));
+        }
+        *h += "</tr>";
+    }
+    *h += "</table><p class=note>Costs of the pipeline over those of the swept pipeline, interpolated at the pipeline's own quality; over 1 \
+           the pipeline is dearer.</p>";
 }
 
 fn details(h: &mut String, s: &Summary) {

@@ -1,6 +1,7 @@
 //! `report.html`: one self-contained page with error against run time as a plot, tables, audits, what was left out, and
 //! pictures beside the reference with their differences. Also the joined report of several runs.
 
+mod equal;
 mod html;
 mod plot;
 
