@@ -312,6 +312,8 @@ pub struct MeshView<'a> {
     pub positions: &'a [Vec3],
     /// Unit normals.
     pub normals: &'a [Vec3],
+    /// sRGB albedo; empty where metrics are not to look at it.
+    pub albedo: &'a [[u8; 4]],
     /// Indices.
     pub indices: &'a [u32],
 }

@@ -40,7 +40,7 @@ fn experiment(scale: f64, offset: f64) -> String {
         "[scene]\npath = \"stones.glb\"\nscale = {scale:?}\noffset = [{offset:?}, {:?}, {:?}]\n\
          [view]\nresolution = [160, 120]\neye_height = [{eye:?}, {eye:?}]\nnear = {:?}\npath = \"line\"\nframes = 9\n\
          max_speed = {:?}\nframes_per_s = 10\n\
-         [[pipeline]]\nname = \"all geometry\"\nfar_field = {{ type = \"geometry\", frustum_culling = false }}\n{}{}{}",
+         [[pipeline]]\nname = \"all geometry\"\nfar_field = {{ type = \"geometry\", frustum_culling = false }}\n{}{}{}{}",
         -offset,
         0.5 * offset,
         0.05 * scale,
@@ -48,6 +48,7 @@ fn experiment(scale: f64, offset: f64) -> String {
         hybrid("one view", "view_test = { type = \"self-occlusion\", max_px = 1e9 }"),
         hybrid("several views", "view_test = { type = \"self-occlusion\", max_px = 0.0 }"),
         hybrid("quadric", "collapse = { type = \"quadric\" }"),
+        hybrid("appearance", "collapse = { type = \"appearance\" }"),
         eye = 1.5 * scale,
     )
 }

@@ -8,11 +8,13 @@ mod builder;
 mod chunk_set;
 mod cut;
 mod looks;
+mod wedges;
 
 pub use builder::{Placement, SceneBuilder};
 pub use chunk_set::ChunkSet;
 pub use cut::{CutMesh, MAX_CHUNK_TRIANGLES, cut};
 pub use looks::{normal_matrix, texture_at, vertex_albedo, vertex_tint};
+pub use wedges::{Gathered, Textured, Wedge, gather};
 
 use std::ops::Range;
 

@@ -21,10 +21,13 @@ pub(super) struct Ratio {
 /// What [`Ratio::cost`] holds.
 pub(super) const COSTS: [&str; 3] = ["triangles", "frame time", "bytes stored"];
 
+/// Quality, decibels, and costs of the pipelines that a sweep made of one.
+type Curve = Vec<(f64, [f64; 3])>;
+
 /// Every pipeline beside every curve of others that spans its quality, in the order of the pipelines.
 pub(super) fn ratios<'a>(pipelines: impl IntoIterator<Item = &'a PipelineSummary>) -> Vec<Ratio> {
     let points: Vec<_> = pipelines.into_iter().filter_map(point).collect();
-    let mut curves: Vec<(&str, Vec<(f64, [f64; 3])>)> = vec![];
+    let mut curves: Vec<(&str, Curve)> = vec![];
     for (name, psnr, cost) in &points {
         match curves.iter_mut().find(|c| c.0 == curve(name)) {
             Some(c) => c.1.push((*psnr, *cost)),

@@ -183,7 +183,12 @@ fn equal_quality(h: &mut String, pipelines: &[PipelineSummary]) {
     for r in ratios {
         push(
             h,
-            format_args!("<tr><td>{}</td><td class=t>{}</td><td>{:.2}</td>", text(&r.name), text(&r.curve), r.psnr_y_db),
+            format_args!(
+                "<tr><td>{}</td><td class=t>{}</td><td>{:.2}</td>",
+                text(&r.name),
+                text(&r.curve),
+                r.psnr_y_db
+            ),
         );
         for c in r.cost {
             push(h, format_args!("<td>{}</td>", c.map_or("-".into(), |c| format!("{c:.2}"))));

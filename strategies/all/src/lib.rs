@@ -41,6 +41,16 @@ macro_rules! incremental {
     };
 }
 
+/// The paper of the point-polygon hierarchy, before a section's number.
+macro_rules! hierarchy {
+    ($section:literal) => {
+        concat!(
+            "Real-time appearance preserving out-of-core rendering with shadows (Guthe, Borodin, Balazs, Klein 2004), section ",
+            $section
+        )
+    };
+}
+
 /// Every strategy, by kind, then by name.
 pub fn registry() -> Vec<Entry> {
     vec![
@@ -127,6 +137,20 @@ pub fn registry() -> Vec<Entry> {
             summary: "Fetches what stands within a radius near to far, frees what was used longest ago",
             source: placement!("5"),
             settings: settings_of::<schedulers::NearToFarLru>(),
+        },
+        Entry {
+            kind: Kind::SimplificationMetric,
+            name: "appearance",
+            summary: "Distance from the original surface and to the original's looks, a bound and an estimate",
+            source: hierarchy!("3.1"),
+            settings: settings_of::<metrics::Appearance>(),
+        },
+        Entry {
+            kind: Kind::SimplificationMetric,
+            name: "hausdorff",
+            summary: "A bound on the two-sided distance from the original surface",
+            source: hierarchy!("3, its purely geometric measure"),
+            settings: settings_of::<metrics::Hausdorff>(),
         },
         Entry {
             kind: Kind::SimplificationMetric,

@@ -257,7 +257,7 @@ fn reduce(
     let originals: Vec<u32> = (0..keep.len() as u32).filter(|&i| keep[i as usize]).collect();
     let locked: Vec<bool> = seen.iter().map(|s| s.locked).collect();
     let live = LiveMesh::new(&mesh.positions, &indices, &locked)?;
-    let view = MeshView { positions: &mesh.positions, normals: &mesh.normals, indices: &indices };
+    let view = MeshView { positions: &mesh.positions, normals: &mesh.normals, albedo: &[], indices: &indices };
     let px = |a: Vec3, b: Vec3| eyes.length_px(a, b);
     let (inner, max_cost) = own.collapse.begin(view, seen, &px, own.edge_px)?;
     let mut cost = Constrained { inner, seen, several_views };

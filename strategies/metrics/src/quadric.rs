@@ -119,7 +119,8 @@ mod tests {
 
     fn triangles(bump: f32, px_per_unit: f32, max_px: f32) -> (usize, bool) {
         let (positions, indices) = field(10, bump);
-        let mesh = MeshView { positions: &positions, normals: &vec![Vec3::Z; positions.len()], indices: &indices };
+        let normals = vec![Vec3::Z; positions.len()];
+        let mesh = MeshView { positions: &positions, normals: &normals, albedo: &[], indices: &indices };
         let px = |a: Vec3, b: Vec3| a.truncate().distance(b.truncate()) * px_per_unit;
         let seen = vec![VertexSeen::default(); positions.len()];
         let (mut cost, max_cost) = Quadric::default().begin(mesh, &seen, &px, max_px).unwrap();

@@ -147,7 +147,7 @@ mod tests {
 
     fn run(metric: &dyn SimplificationMetric, seen: &[VertexSeen], normals: &[Vec3], max_px: f32) -> (Vec<u32>, f32) {
         let (positions, _, indices) = fan();
-        let mesh = MeshView { positions: &positions, normals, indices: &indices };
+        let mesh = MeshView { positions: &positions, normals, albedo: &[], indices: &indices };
         let px = |a: Vec3, b: Vec3| a.distance(b) * 10.0;
         let (mut cost, max_cost) = metric.begin(mesh, seen, &px, max_px).unwrap();
         let live = LiveMesh::new(&positions, &indices, &[]).unwrap();

@@ -20,10 +20,8 @@
 
 use farfield_core::bvh::{TriangleBvh, nearest_on_triangle};
 use farfield_core::color::{byte_of_linear, linear_of_byte};
-use farfield_core::scene::{Texture, texture_at};
+use farfield_core::scene::{Gathered, Texture, Textured, texture_at};
 use glam::Vec3;
-
-use super::gather::{Source, Textured};
 
 /// How far a bound may stand above what was met before it is made better.
 const SLACK: f32 = 1.05;
@@ -40,7 +38,7 @@ const TEXTURE_SAMPLES: f32 = 64.0;
 
 /// An object to compare levels with.
 pub(super) struct Original<'a> {
-    source: &'a Source,
+    source: &'a Gathered,
     textures: &'a [Texture],
     bvh: TriangleBvh,
     /// Vertices that triangles use, each with one of its wedges after the other.
@@ -53,7 +51,7 @@ pub(super) struct Original<'a> {
 struct Target<'a> {
     bvh: TriangleBvh,
     corners: &'a [[u32; 3]],
-    source: &'a Source,
+    source: &'a Gathered,
 }
 
 /// A point with its nearest triangle.
@@ -67,7 +65,7 @@ struct Met {
 
 impl<'a> Original<'a> {
     /// Its hierarchy. O(n log n).
-    pub(super) fn new(source: &'a Source, textures: &'a [Texture]) -> Self {
+    pub(super) fn new(source: &'a Gathered, textures: &'a [Texture]) -> Self {
         let mut wedges: Vec<Vec<u32>> = vec![vec![]; source.positions.len()];
         let mut used = vec![false; source.wedges.len()];
         source.corners.iter().flatten().for_each(|&w| used[w as usize] = true);
@@ -204,7 +202,7 @@ impl Target<'_> {
     }
 }
 
-fn built(source: &Source, corners: &[[u32; 3]]) -> TriangleBvh {
+fn built(source: &Gathered, corners: &[[u32; 3]]) -> TriangleBvh {
     let indices: Vec<u32> = corners.iter().flat_map(|&c| source.vertices(c)).collect();
     TriangleBvh::build(&source.positions, &indices)
 }

@@ -11,12 +11,12 @@ use farfield_core::collapse::{
 };
 use farfield_core::context::Context;
 use farfield_core::payload::MeshPart;
-use farfield_core::scene::Texture;
+use farfield_core::scene::{Gathered, Texture, Wedge};
 use glam::Vec3;
 
 use super::StaticLod;
 use super::deviation::Original;
-use super::gather::{Source, Wedge};
+
 use super::index::MOST_LEVELS;
 
 /// A level of detail.
@@ -35,7 +35,7 @@ pub(super) struct Level {
 /// [`Fault::Cancelled`], or [`Fault::Data`] where the mesh contradicts itself.
 pub(super) fn levels(
     own: &StaticLod,
-    source: &Source,
+    source: &Gathered,
     textures: &[Texture],
     cx: &Context<'_>,
 ) -> Result<Vec<Level>, Fault> {
@@ -93,7 +93,7 @@ const COLOUR_WEIGHT: f32 = 0.5;
 /// between a dying vertex's wedges and the survivor's most like them; of several wedges the worst served counts.
 struct Coloured<'a> {
     quadrics: Quadrics,
-    source: &'a Source,
+    source: &'a Gathered,
     wedges: &'a [Vec<u32>],
 }
 
@@ -127,14 +127,14 @@ fn unit(c: [u8; 4]) -> Vec3 {
 }
 
 /// For each vertex its wedges.
-fn wedges_of(source: &Source) -> Vec<Vec<u32>> {
+fn wedges_of(source: &Gathered) -> Vec<Vec<u32>> {
     let mut out = vec![vec![]; source.positions.len()];
     (0u32..).zip(&source.wedges).for_each(|(i, w)| out[w.vertex as usize].push(i));
     out
 }
 
 /// The wedge that looks most like another: least squared difference of normals and of albedo (over 255), the first of equals.
-fn alike(source: &Source, among: &[u32], to: &Wedge) -> u32 {
+fn alike(source: &Gathered, among: &[u32], to: &Wedge) -> u32 {
     let off = |w: &u32| {
         let w = &source.wedges[*w as usize];
         w.normal.distance_squared(to.normal) + unit(w.albedo).distance_squared(unit(to.albedo))
@@ -142,7 +142,7 @@ fn alike(source: &Source, among: &[u32], to: &Wedge) -> u32 {
     among.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or_default()
 }
 
-fn parts(source: &Source, corners: &[[u32; 3]], two_sided: &[bool]) -> Vec<MeshPart> {
+fn parts(source: &Gathered, corners: &[[u32; 3]], two_sided: &[bool]) -> Vec<MeshPart> {
     let of = |two: bool| {
         let mut part = MeshPart { two_sided: two, ..MeshPart::default() };
         let mut local = vec![u32::MAX; source.wedges.len()];

@@ -23,16 +23,15 @@
 //! Stored: a chain has about 1 / (1 - ratio) - 1 times the original's triangles.
 
 mod deviation;
-mod gather;
 mod index;
 mod levels;
 mod view;
 
 use farfield_core::cell::Cell;
 use farfield_core::context::{Context, collect};
-use farfield_core::id::{AssetId, LocalPayload, ObjectId};
+use farfield_core::id::{AssetId, ChunkId, LocalPayload};
 use farfield_core::payload::{MeshPart, Part, Payload};
-use farfield_core::scene::Scene;
+use farfield_core::scene::{Scene, gather};
 use farfield_core::strategy::{CellJob, Covers, FarField, FarView, LeftOut, Needs, SceneJob, Sink};
 use farfield_core::{Aabb, Fault};
 use schemars::JsonSchema;
@@ -104,7 +103,8 @@ impl StaticLod {
         if triangles < u64::from(self.least_triangles) {
             return Ok(None);
         }
-        let source = gather::gather(job.scene, ObjectId(id))?;
+        let chunks = object.chunks.clone().map(ChunkId);
+        let source = gather(job.scene, chunks, object.bounds.centre().as_dvec3())?;
         let mut entries = vec![];
         for (i, level) in levels::levels(self, &source, &job.scene.textures, cx)?.into_iter().enumerate() {
             let Some(payload) = payload_id(id, i) else {

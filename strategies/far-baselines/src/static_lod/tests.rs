@@ -175,7 +175,8 @@ fn sampled(from: &Triangles, to: &Triangles, n: usize, rng: &mut ChaCha8Rng) -> 
 }
 
 fn original(scene: &Scene, object: u32) -> Triangles {
-    let source = gather::gather(scene, ObjectId(object)).unwrap();
+    let o = &scene.objects[object as usize];
+    let source = gather(scene, o.chunks.clone().map(ChunkId), o.bounds.centre().as_dvec3()).unwrap();
     source.corners.iter().map(|&c| source.places(c)).collect()
 }
 

@@ -1,61 +1,70 @@
-//! An object's original geometry, gathered: all its chunks welded into one mesh, with what its corners look like.
+//! Original geometry gathered for bakes: placed chunks welded into one mesh, with what its corners look like.
 //!
-//! Positions are welded by the names that chunks share mesh-wide. A *wedge* is a vertex with one normal and one albedo: seams have
-//! several wedges a vertex, so that collapsing does not tear them open and attributes do not bleed over them. O(vertices + triangles).
+//! Positions are welded by the names that chunks share mesh-wide, within each object. A *wedge* is a vertex with one normal and one
+//! albedo: seams have several wedges a vertex, so that collapsing does not tear them open and attributes do not bleed over them.
+//! O(vertices + triangles).
 
 use std::collections::HashMap;
 
-use farfield_core::Fault;
-use farfield_core::color::byte_of_linear;
-use farfield_core::id::{ChunkId, ObjectId};
-use farfield_core::mesh::ChunkMesh;
-use farfield_core::scene::{Material, Scene, Texture, normal_matrix, vertex_albedo, vertex_tint};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+
+use super::{Material, Scene, Texture, normal_matrix, vertex_albedo, vertex_tint};
+use crate::Fault;
+use crate::color::byte_of_linear;
+use crate::id::{ChunkId, ObjectId};
+use crate::mesh::ChunkMesh;
 
 /// A vertex as one side of a seam sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Wedge {
-    pub(super) vertex: u32,
+pub struct Wedge {
+    /// Index of the welded position.
+    pub vertex: u32,
     /// Unit normal, local frame.
-    pub(super) normal: Vec3,
+    pub normal: Vec3,
     /// sRGB.
-    pub(super) albedo: [u8; 4],
+    pub albedo: [u8; 4],
 }
 
 /// A triangle whose inside looks otherwise than its corners: it wears a texture.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Textured {
-    pub(super) triangle: u32,
+pub struct Textured {
+    /// Index of the triangle.
+    pub triangle: u32,
     /// Index into the scene's textures.
-    pub(super) texture: u32,
-    pub(super) uv: [Vec2; 3],
+    pub texture: u32,
+    /// Texture coordinates of its corners.
+    pub uv: [Vec2; 3],
     /// What the texture is multiplied by at the corners, linear.
-    pub(super) tint: [Vec3; 3],
+    pub tint: [Vec3; 3],
 }
 
-/// An object in one piece. Triangles are counter-clockwise seen from in front as they are placed.
-#[derive(Debug, Default)]
-pub(super) struct Source {
+/// Placed chunks in one piece. Triangles are counter-clockwise seen from in front as they are placed.
+#[derive(Clone, Debug, Default)]
+pub struct Gathered {
     /// Where positions start from, local frame.
-    pub(super) origin: DVec3,
+    pub origin: DVec3,
     /// Welded, relative to the origin.
-    pub(super) positions: Vec<Vec3>,
-    pub(super) wedges: Vec<Wedge>,
+    pub positions: Vec<Vec3>,
+    /// For each position the object it belongs to and its name there.
+    pub names: Vec<(ObjectId, u32)>,
+    /// Looks of vertices.
+    pub wedges: Vec<Wedge>,
     /// A wedge a corner.
-    pub(super) corners: Vec<[u32; 3]>,
+    pub corners: Vec<[u32; 3]>,
     /// Whether a triangle is seen from behind too.
-    pub(super) two_sided: Vec<bool>,
-    pub(super) textured: Vec<Textured>,
+    pub two_sided: Vec<bool>,
+    /// The triangles with textures.
+    pub textured: Vec<Textured>,
 }
 
-impl Source {
+impl Gathered {
     /// The three vertices of a triangle.
-    pub(super) fn vertices(&self, corners: [u32; 3]) -> [u32; 3] {
+    pub fn vertices(&self, corners: [u32; 3]) -> [u32; 3] {
         corners.map(|w| self.wedges[w as usize].vertex)
     }
 
     /// The places of a triangle's corners.
-    pub(super) fn places(&self, corners: [u32; 3]) -> [Vec3; 3] {
+    pub fn places(&self, corners: [u32; 3]) -> [Vec3; 3] {
         self.vertices(corners).map(|v| self.positions[v as usize])
     }
 }
@@ -63,31 +72,32 @@ impl Source {
 /// Names of wedges: vertex, bits of the normal, albedo.
 type Names = HashMap<(u32, [u32; 3], [u8; 4]), u32>;
 
-/// All chunks of an object.
+/// Placed chunks in one piece, positions relative to `origin`.
 ///
 /// # Errors
 /// What reading the geometry gives.
-pub(super) fn gather(scene: &Scene, id: ObjectId) -> Result<Source, Fault> {
-    let object = &scene.objects[id.index()];
-    let origin = object.bounds.centre().as_dvec3();
-    let place = DAffine3::from_translation(-origin) * object.placement;
-    let turn = normal_matrix(&object.placement.matrix3);
-    let mut out = Source { origin, ..Source::default() };
-    let mut local = vec![u32::MAX; scene.meshes[object.mesh.index()].vertex_ids as usize];
+pub fn gather(scene: &Scene, chunks: impl IntoIterator<Item = ChunkId>, origin: DVec3) -> Result<Gathered, Fault> {
+    let mut out = Gathered { origin, ..Gathered::default() };
+    let mut local: HashMap<(ObjectId, u32), u32> = HashMap::new();
     let mut names = Names::new();
-    for c in object.chunks.clone().map(ChunkId) {
+    for c in chunks {
+        let placed = &scene.chunks[c.index()];
+        let object = &scene.objects[placed.object.index()];
+        let place = DAffine3::from_translation(-origin) * object.placement;
+        let turn = normal_matrix(&object.placement.matrix3);
         let material = scene.materials.get(scene.material_of(c).index()).cloned().unwrap_or_default();
         let texture = material.texture.and_then(|t| Some((t.0, scene.textures.get(t.index())?)));
-        scene.geometry.with(scene.chunks[c.index()].source, &mut |chunk| {
+        scene.geometry.with(placed.source, &mut |chunk| {
             let looks = Looks { chunk, material: &material, texture };
             let wedges: Vec<u32> = (0..chunk.positions.len())
                 .map(|i| {
-                    let vertex = &mut local[chunk.vertex_ids[i] as usize];
-                    if *vertex == u32::MAX {
-                        *vertex = out.positions.len() as u32;
+                    let name = (placed.object, chunk.vertex_ids[i]);
+                    let vertex = *local.entry(name).or_insert_with(|| {
                         out.positions.push(place.transform_point3(chunk.positions[i].as_dvec3()).as_vec3());
-                    }
-                    looks.wedge(i, *vertex, &turn, &mut names, &mut out.wedges)
+                        out.names.push(name);
+                        out.positions.len() as u32 - 1
+                    });
+                    looks.wedge(i, vertex, &turn, &mut names, &mut out.wedges)
                 })
                 .collect();
             for t in chunk.indices.chunks_exact(3) {
