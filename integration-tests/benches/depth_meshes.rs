@@ -10,7 +10,8 @@
 //!   --sampling-px N, --most N (samples), --set KEY=JSON (of the far field)
 //! ```
 //!
-//! What a mode does not need it ignores: `samples` and `truth` build no meshes. Regions are those that the scene's own route visits, spread evenly over it.
+//! What a mode does not need it ignores: `samples` and `truth` build no meshes. Regions are those that the scene's own route visits, spread
+//! evenly over it.
 
 use std::path::Path;
 use std::sync::Mutex;

@@ -45,8 +45,6 @@ pub struct Gathered {
     pub origin: DVec3,
     /// Welded, relative to the origin.
     pub positions: Vec<Vec3>,
-    /// For each position the object it belongs to and its name there.
-    pub names: Vec<(ObjectId, u32)>,
     /// Looks of vertices.
     pub wedges: Vec<Wedge>,
     /// A wedge a corner.
@@ -94,7 +92,6 @@ pub fn gather(scene: &Scene, chunks: impl IntoIterator<Item = ChunkId>, origin: 
                     let name = (placed.object, chunk.vertex_ids[i]);
                     let vertex = *local.entry(name).or_insert_with(|| {
                         out.positions.push(place.transform_point3(chunk.positions[i].as_dvec3()).as_vec3());
-                        out.names.push(name);
                         out.positions.len() as u32 - 1
                     });
                     looks.wedge(i, vertex, &turn, &mut names, &mut out.wedges)

@@ -96,3 +96,13 @@ fn nested_strategies_have_their_kind_and_their_default_by_name() {
     assert_eq!(of("edge_px").unit, "px");
     assert_eq!(of("facing").ty, SettingType::Choice(vec!["any-corner".into(), "all-corners".into()]));
 }
+
+#[test]
+fn settings_that_only_frames_depend_on_are_settings() {
+    for e in registry().into_iter().filter(|e| e.kind == Kind::FarField) {
+        let far: Box<dyn FarField> = serde_json::from_value(Value::Object(least(&e))).unwrap();
+        for name in far.frame_settings() {
+            assert!(e.settings.iter().any(|s| s.name == *name), "{} has no setting {name}", e.name);
+        }
+    }
+}

@@ -16,7 +16,7 @@
 //!
 //! Traps: angles are taken from sine and cosine, so that rounding over 1 does no harm. On a triangle without any variation kappa_1 is 0
 //! and no other place looks otherwise: what differs there costs infinity, what does not differ nothing. Differences of less than
-//! half a grey level of Lambert's shading, [`LEAST`], do not count.
+//! half a grey level of Lambert's shading, 1/510, do not count.
 
 use farfield_core::Fault;
 use farfield_core::bvh::nearest_on_triangle;
@@ -29,7 +29,7 @@ use serde::{Deserialize, Serialize};
 use crate::hausdorff::{Deviation, Patch, weights};
 
 /// A difference of attributes that nobody sees: radians of a normal, since |d cos| <= |d angle|, and parts of white of an albedo.
-pub const LEAST: f32 = 0.5 / 255.0;
+const LEAST: f32 = 0.5 / 255.0;
 
 /// Geometric distance and distance to the same looks.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
@@ -171,7 +171,8 @@ fn foot(mesh: &LiveMesh, patch: &Patch, onto: u32, at: Vec3) -> Option<Foot> {
         let (a, b, corners) = (mesh.position(x), mesh.position(y), [onto, x, y]);
         if let Some((across, up)) = axes {
             let flat = |v: Vec3| Vec2::new((v - q).dot(across), (v - q).dot(up));
-            if let Some([u, v]) = weights([Vec2::ZERO, flat(a), flat(b)], flat(at)) {
+            let [u, v] = weights([Vec2::ZERO, flat(a), flat(b)], flat(at));
+            if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
                 return Some(Foot { triangle, corners, weights: [1.0 - u - v, u, v] });
             }
         }
@@ -273,7 +274,10 @@ mod tests {
             let least = out.indices.chunks_exact(3).filter_map(|t| {
                 let t = [t[0], t[1], t[2]];
                 let c = t.map(|i| out.positions[i as usize]);
-                let [x, y] = weights(c.map(|c| c.truncate()), p.truncate())?;
+                let [x, y] = weights(c.map(|c| c.truncate()), p.truncate());
+                if !(x >= 0.0 && y >= 0.0 && x + y <= 1.0) {
+                    return None;
+                }
                 let n = t.map(|i| normals[i as usize]);
                 let between = (n[0] * (1.0 - x - y) + n[1] * x + n[2] * y).normalize();
                 Some(away(angle(normals[v], between), |i, j| angle(n[i], n[j]), &c))

@@ -44,6 +44,9 @@ impl SimplificationMetric for Hausdorff {
     }
 }
 
+/// How far parts of an edge or of a triangle may lie outside it after rounding.
+const ROUNDING: f32 = 1e-4;
+
 /// What a collapse moves, beside what its triangles stood for before.
 pub(crate) struct Deviation<'a> {
     px: &'a (dyn Fn(Vec3, Vec3) -> f32 + Sync),
@@ -175,11 +178,11 @@ impl Patch {
     fn distance(&mut self, mesh: &LiveMesh, from: u32, onto: u32) -> Option<f32> {
         let (p, q) = (mesh.position(from), mesh.position(onto));
         // Inside a surface every spoke has two triangles, and the edge itself; on a border one spoke has one, and so has the edge.
-        let ends: Vec<u32> = self.spokes.iter().filter(|s| s.1 == 1).map(|s| s.0).collect();
+        let mut ends = self.spokes.iter().filter(|s| s.1 == 1).map(|s| s.0);
         let manifold = self.spokes.iter().all(|s| s.1 <= 2);
-        let (start, slid) = match (manifold, self.gone.len(), ends.as_slice()) {
-            (true, 2, []) => (p, 0.0),
-            (true, 1, &[end]) => {
+        let (start, slid) = match (manifold, self.gone.len(), [ends.next(), ends.next()]) {
+            (true, 2, [None, _]) => (p, 0.0),
+            (true, 1, [Some(end), None]) => {
                 let e = mesh.position(end);
                 let along = e - q;
                 let t = (p - q).dot(along) / along.length_squared();
@@ -216,12 +219,19 @@ impl Patch {
         self.flat.extend(self.spokes.iter().map(|s| flat(mesh.position(s.0))));
         let centre = flat(q);
         let mut most = 0f32;
-        // The dying vertex under or over the triangle that covers it; on a border it lies on a new edge.
-        for &(_, pair) in &self.moved {
-            let [a, b] = pair.map(|v| flat(mesh.position(v)));
-            if let Some(h) = height([centre, a, b], Vec2::ZERO) {
-                most = most.max(h.abs());
+        // The dying vertex under or over the triangle that covers it, or that, after rounding, comes nearest to it; on a border it lies
+        // on a new edge.
+        if self.gone.len() == 2 {
+            let over = self.moved.iter().map(|&(_, pair)| {
+                let [a, b] = pair.map(|v| flat(mesh.position(v)));
+                let [u, v] = weights([centre.0, a.0, b.0], Vec2::ZERO);
+                (u.min(v).min(1.0 - u - v), (1.0 - u - v) * centre.1 + u * a.1 + v * b.1)
+            });
+            let (inside, height) = over.max_by(|a, b| a.0.total_cmp(&b.0))?;
+            if inside.is_nan() || inside < -ROUNDING {
+                return None;
             }
+            most = height.abs();
         }
         // Old edges run from the origin, at height 0; new ones from the survivor.
         for (i, &(x, hx)) in self.flat.iter().enumerate() {
@@ -236,26 +246,20 @@ impl Patch {
     }
 }
 
-/// The height of a triangle (places and heights) over a point inside it.
-fn height([a, b, c]: [(Vec2, f32); 3], p: Vec2) -> Option<f32> {
-    let [x, y] = weights([a.0, b.0, c.0], p)?;
-    Some(a.1 * (1.0 - x - y) + b.1 * x + c.1 * y)
-}
-
-/// The weights of b and c of a point inside a triangle.
-pub(crate) fn weights([a, b, c]: [Vec2; 3], p: Vec2) -> Option<[f32; 2]> {
+/// The weights of b and c of a point in the plane of a triangle.
+pub(crate) fn weights([a, b, c]: [Vec2; 3], p: Vec2) -> [f32; 2] {
     let (u, v, w) = (b - a, c - a, p - a);
     let area = u.perp_dot(v);
-    let (x, y) = (w.perp_dot(v) / area, u.perp_dot(w) / area);
-    (x >= 0.0 && y >= 0.0 && x + y <= 1.0).then_some([x, y])
+    [w.perp_dot(v) / area, u.perp_dot(w) / area]
 }
 
-/// Where the segment from the origin to `x` meets that from `c` to `y`, as parts of both.
+/// Where the segment from the origin to `x` meets that from `c` to `y`, as parts of both; an end that touches counts, whatever is rounded.
 fn crossing(x: Vec2, c: Vec2, y: Vec2) -> Option<(f32, f32)> {
+    const PART: std::ops::RangeInclusive<f32> = -ROUNDING..=1.0 + ROUNDING;
     let d = y - c;
     let area = x.perp_dot(d);
     let (s, t) = (c.perp_dot(d) / area, c.perp_dot(x) / area);
-    ((0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t)).then_some((s, t))
+    (PART.contains(&s) && PART.contains(&t)).then_some((s, t))
 }
 
 #[cfg(test)]
@@ -326,6 +330,31 @@ mod tests {
         let out = simplified(&positions, &indices, 0.76, Settings::default());
         assert_eq!(out.indices.len(), 6);
         assert!((out.max_cost - 0.75).abs() < 1e-6, "{}", out.max_cost);
+    }
+
+    #[test]
+    fn a_tip_over_a_new_edge_is_never_lost_to_rounding() {
+        // A new edge from the survivor to the opposite corner passes right under the tip, whichever way all of it is turned.
+        for i in 0..500 {
+            let turn = glam::Quat::from_euler(glam::EulerRot::XYZ, i as f32 * 0.37, i as f32 * 0.11, i as f32 * 0.71);
+            let offset = Vec3::new(3.0, -7.0, 11.0) * (i % 5) as f32;
+            let around = |k: u32| {
+                let a = std::f32::consts::TAU * k as f32 / 6.0;
+                turn * Vec3::new(a.cos(), a.sin(), 0.0) + offset
+            };
+            let positions: Vec<Vec3> = (0..6).map(around).chain([turn * (Vec3::Z * 0.2) + offset]).collect();
+            let indices: Vec<u32> = (0..6).flat_map(|k| [k, (k + 1) % 6, 6]).collect();
+            // The corners are held: the tip alone may go.
+            let normals = vec![Vec3::Z; 7];
+            let mesh = MeshView { positions: &positions, normals: &normals, albedo: &[], indices: &indices };
+            let locked = [true, true, true, true, true, true, false];
+            let px = |a: Vec3, b: Vec3| a.distance(b);
+            let (mut cost, _) = Hausdorff::default().begin(mesh, &[], &px, 1.0).unwrap();
+            let out =
+                collapse(LiveMesh::new(&positions, &indices, &locked).unwrap(), cost.as_mut(), &Settings::default());
+            assert_eq!(out.indices.len(), 12);
+            assert!((out.max_cost - 0.2).abs() < 1e-4, "turned {i}: {}", out.max_cost);
+        }
     }
 
     #[test]

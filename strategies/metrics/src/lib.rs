@@ -9,7 +9,7 @@ mod self_occlusion;
 mod silhouette_weighted;
 mod void_surface;
 
-pub use appearance::{Appearance, LEAST};
+pub use appearance::Appearance;
 pub use hausdorff::Hausdorff;
 pub use quadric::Quadric;
 pub use self_occlusion::SelfOcclusion;

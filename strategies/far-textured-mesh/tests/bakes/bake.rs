@@ -1,9 +1,7 @@
 //! Whole bakes of small scenes: the same bytes for any number of threads, the same mesh at any scale, the reference's picture
 //! from the cell's centre, and what is refused or left out.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use farfield_core::Camera;
 use farfield_core::backend::{Backend, BlockData};
 use farfield_core::context::{Capture, Shot};

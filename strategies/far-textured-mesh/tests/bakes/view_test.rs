@@ -1,9 +1,6 @@
 //! The void surface as the test between one view and several: far and convex objects pass, near and slotted ones fail.
 
-#[allow(dead_code, reason = "shared with the other tests")]
-mod common;
-
-use common::*;
+use crate::common::*;
 use farfield_core::id::MaterialId;
 use farfield_core::mesh::TriangleMesh;
 use farfield_core::payload::Part;

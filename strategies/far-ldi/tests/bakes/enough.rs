@@ -1,9 +1,6 @@
 //! A metric decides how many construction images are taken: more where more is hidden, as many as its threshold asks for.
 
-#[allow(dead_code, reason = "shared with images.rs")]
-mod common;
-
-use common::*;
+use crate::common::*;
 use farfield_core::cell::Cell;
 use farfield_core::id::CellId;
 use farfield_core::scene::{Material, Placement, Scene, SceneBuilder};

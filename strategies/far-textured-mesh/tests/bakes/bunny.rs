@@ -4,12 +4,10 @@
 //! cell's centre along +z; eyes at 17, 1024 pixels, 60 degrees, cost_scale 8. **Yaw 0**, the scan's own orientation: the paper does not say
 //! its. Needs the real mesh: FARFIELD_MODELS.
 
-mod common;
-
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use common::*;
+use crate::common::*;
 use farfield_core::Aabb;
 use farfield_core::id::MaterialId;
 use farfield_core::mesh::TriangleMesh;

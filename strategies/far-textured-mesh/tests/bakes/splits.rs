@@ -1,10 +1,8 @@
 //! A cell with two splits: each draws its own far chunks through its own windows, and what both share is baked once.
 
-mod common;
-
 use std::collections::BTreeSet;
 
-use common::*;
+use crate::common::*;
 use farfield_core::cell::{Active, Sector, Split};
 use farfield_core::draw::{Draw, DrawWhat};
 use farfield_core::id::{AssetId, Block, ChunkId, MaterialId, SectorId, SplitId};

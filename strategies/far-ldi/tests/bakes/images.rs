@@ -1,8 +1,6 @@
 //! Whole bakes beside the scene itself: what is missing, what is doubled, what is refused.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use farfield_core::cell::{Active, Cell, Split};
 use farfield_core::id::{AssetId, Block, CellId, ChunkId, SectorId, SplitId};
 use farfield_core::layered::LayeredPart;
