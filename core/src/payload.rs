@@ -91,6 +91,13 @@ pub struct AtlasPart {
     pub normal: Vec<[u8; 4]>,
 }
 
+impl MeshPart {
+    /// Bytes in memory: position, normal and albedo a vertex, three indices a triangle.
+    pub fn bytes(&self) -> u64 {
+        28 * self.positions.len() as u64 + 4 * self.indices.len() as u64
+    }
+}
+
 impl ProjectedPart {
     /// The two projectors that show a surface point to an eye, and the weight of the first: w = a2 / (a1 + a2), where a1 and
     /// a2 are 1 - cos of the angles at the point between the eye and each projector (so w is 1 where the eye stands in the

@@ -333,6 +333,12 @@ pub trait SimplificationMetric: Send + Sync + Debug {
         px: &'a (dyn Fn(Vec3, Vec3) -> f32 + Sync),
         max_px: f32,
     ) -> Result<(Box<dyn Cost + 'a>, f32), Fault>;
+
+    /// Whether the highest cost paid bounds, in the unit of `px`, how far any point of the original lies from the simplified surface and
+    /// the other way round. By default not.
+    fn bounds_distance(&self) -> bool {
+        false
+    }
 }
 
 /// What a visibility metric judges: an object as a cell sees it.

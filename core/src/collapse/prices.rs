@@ -35,6 +35,11 @@ impl Prices {
         self.histogram[(key >> (32 - COARSE)) as usize] += 1;
     }
 
+    /// The price that was pushed as the `i`-th, to the bits that order it.
+    pub(super) fn of(&self, i: u32) -> f32 {
+        price(self.keys[i as usize])
+    }
+
     /// Indices of the cheapest `share` of all, cheapest first, less those that cost more than the `wanted`-th and some slack; with
     /// a share of 1 all.
     pub(super) fn cheapest(&mut self, wanted: usize, share: f32) -> &[u32] {

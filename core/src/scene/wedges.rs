@@ -13,6 +13,7 @@ use crate::Fault;
 use crate::color::byte_of_linear;
 use crate::id::{ChunkId, ObjectId};
 use crate::mesh::ChunkMesh;
+use crate::payload::MeshPart;
 
 /// A vertex as one side of a seam sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,6 +54,8 @@ pub struct Gathered {
     pub two_sided: Vec<bool>,
     /// The triangles with textures.
     pub textured: Vec<Textured>,
+    /// Whose vertex each position is, by the name that the object's chunks share.
+    pub names: Vec<(ObjectId, u32)>,
 }
 
 impl Gathered {
@@ -65,6 +68,46 @@ impl Gathered {
     pub fn places(&self, corners: [u32; 3]) -> [Vec3; 3] {
         self.vertices(corners).map(|v| self.positions[v as usize])
     }
+
+    /// For each vertex its wedges.
+    pub fn wedges_of_vertices(&self) -> Vec<Vec<u32>> {
+        let mut out = vec![vec![]; self.positions.len()];
+        (0u32..).zip(&self.wedges).for_each(|(i, w)| out[w.vertex as usize].push(i));
+        out
+    }
+
+    /// The wedge that looks most like another: least squared difference of normals and of albedo (over 255), the first of equals.
+    pub fn alike(&self, among: &[u32], to: &Wedge) -> u32 {
+        let off = |w: &u32| {
+            let w = &self.wedges[*w as usize];
+            w.normal.distance_squared(to.normal) + unit(w.albedo).distance_squared(unit(to.albedo))
+        };
+        among.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or_default()
+    }
+
+    /// Triangles as parts to draw: one-sided ones before two-sided ones, none without triangles.
+    pub fn parts(&self, corners: &[[u32; 3]], two_sided: &[bool]) -> Vec<MeshPart> {
+        let of = |two: bool| {
+            let mut part = MeshPart { two_sided: two, ..MeshPart::default() };
+            let mut local = vec![u32::MAX; self.wedges.len()];
+            for &w in corners.iter().zip(two_sided).filter(|(_, t)| **t == two).flat_map(|(c, _)| c) {
+                let (at, wedge) = (&mut local[w as usize], &self.wedges[w as usize]);
+                if *at == u32::MAX {
+                    *at = part.positions.len() as u32;
+                    part.positions.push(self.positions[wedge.vertex as usize]);
+                    part.normals.push(wedge.normal);
+                    part.albedo.push(wedge.albedo);
+                }
+                part.indices.push(*at);
+            }
+            part
+        };
+        [false, true].map(of).into_iter().filter(|p| !p.indices.is_empty()).collect()
+    }
+}
+
+fn unit(c: [u8; 4]) -> Vec3 {
+    Vec3::new(f32::from(c[0]), f32::from(c[1]), f32::from(c[2])) / 255.0
 }
 
 /// Names of wedges: vertex, bits of the normal, albedo.
@@ -92,6 +135,7 @@ pub fn gather(scene: &Scene, chunks: impl IntoIterator<Item = ChunkId>, origin: 
                     let name = (placed.object, chunk.vertex_ids[i]);
                     let vertex = *local.entry(name).or_insert_with(|| {
                         out.positions.push(place.transform_point3(chunk.positions[i].as_dvec3()).as_vec3());
+                        out.names.push(name);
                         out.positions.len() as u32 - 1
                     });
                     looks.wedge(i, vertex, &turn, &mut names, &mut out.wedges)

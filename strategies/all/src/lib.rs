@@ -7,8 +7,8 @@
 use farfield_core::registry::{Entry, Kind, settings_of};
 
 pub use {
-    farfield_far_baselines as far_baselines, farfield_far_itdm as far_itdm, farfield_far_ldi as far_ldi,
-    farfield_far_textured_mesh as far_textured_mesh, farfield_metrics as metrics,
+    farfield_far_baselines as far_baselines, farfield_far_hlod as far_hlod, farfield_far_itdm as far_itdm,
+    farfield_far_ldi as far_ldi, farfield_far_textured_mesh as far_textured_mesh, farfield_metrics as metrics,
     farfield_partition_adaptive_grid as partition_adaptive_grid, farfield_partition_hex as partition_hex,
     farfield_partition_octree as partition_octree, farfield_partition_single_cell as partition_single_cell,
     farfield_schedulers as schedulers,
@@ -74,6 +74,13 @@ pub fn registry() -> Vec<Entry> {
             summary: "What is far as pictures with several samples a pixel, warped to the eye",
             source: placement!("4"),
             settings: settings_of::<far_ldi::LayeredDepthImage>(),
+        },
+        Entry {
+            kind: Kind::FarField,
+            name: "point-polygon-hlod",
+            summary: "One octree of simplified nodes for near and far, with a bound of the error on screen",
+            source: hierarchy!("3 and 4"),
+            settings: settings_of::<far_hlod::PointPolygonHlod>(),
         },
         Entry {
             kind: Kind::FarField,

@@ -74,7 +74,7 @@ impl FarView for TexturedView {
             let info = &view.scene.meshes[placed.source.mesh.index()].chunks[placed.source.chunk as usize];
             out.push(Candidate {
                 block: Block::Chunk(placed.source),
-                bytes: u64::from(info.vertices) * 40 + u64::from(info.triangles) * 12,
+                bytes: info.bytes(),
                 bounds: placed.bounds,
                 error_px_without: f32::INFINITY,
                 in_view: view.camera.may_see(&placed.bounds),

@@ -52,7 +52,11 @@ impl SimplificationMetric for Appearance {
             let cause = format!("{n} normals and {a} albedos for {p} positions");
             return Err(Fault::Data { place: "appearance".into(), cause });
         }
-        Ok((Box::new(Deviation::new(&mesh, px, Some(Looks::new(&mesh)))), max_px))
+        Ok((Box::new(Deviation::new(&mesh, px, Some(Looks::new(&mesh)), max_px)), max_px))
+    }
+
+    fn bounds_distance(&self) -> bool {
+        true
     }
 }
 
@@ -78,8 +82,8 @@ impl<'a> Looks<'a> {
         }
     }
 
-    /// The largest distance to the same looks over what the patch covers once `from` went onto `onto`, scene units.
-    pub(crate) fn off(&mut self, mesh: &LiveMesh, patch: &Patch, from: u32, onto: u32) -> f32 {
+    /// The largest distance to the same looks over what the patch covers once `from` went onto `onto`, scene units; infinite above `limit`.
+    pub(crate) fn off(&mut self, mesh: &LiveMesh, patch: &Patch, from: u32, onto: u32, limit: f32) -> f32 {
         self.cover(patch, from);
         let mut most = 0f32;
         for i in 0..self.all.len() {
@@ -87,8 +91,8 @@ impl<'a> Looks<'a> {
             if let Some(foot) = foot(mesh, patch, onto, self.positions[v as usize]) {
                 most = most.max(self.distance(mesh, v, &foot));
             }
-            if most == f32::INFINITY {
-                break;
+            if most > limit {
+                return f32::INFINITY;
             }
         }
         most

@@ -25,6 +25,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::appearance::Looks;
+use crate::star::{ROUNDING, Stars};
 
 /// The two-sided distance from the original surface.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
@@ -40,12 +41,13 @@ impl SimplificationMetric for Hausdorff {
         px: &'a (dyn Fn(Vec3, Vec3) -> f32 + Sync),
         max_px: f32,
     ) -> Result<(Box<dyn Cost + 'a>, f32), Fault> {
-        Ok((Box::new(Deviation::new(&mesh, px, None)), max_px))
+        Ok((Box::new(Deviation::new(&mesh, px, None, max_px)), max_px))
+    }
+
+    fn bounds_distance(&self) -> bool {
+        true
     }
 }
-
-/// How far parts of an edge or of a triangle may lie outside it after rounding.
-const ROUNDING: f32 = 1e-4;
 
 /// What a collapse moves, beside what its triangles stood for before.
 pub(crate) struct Deviation<'a> {
@@ -53,7 +55,10 @@ pub(crate) struct Deviation<'a> {
     /// The bound of each triangle, pixels.
     bounds: Vec<f32>,
     looks: Option<Looks<'a>>,
+    /// Costs above it are as good as infinite.
+    most: f32,
     patch: Patch,
+    stars: Stars,
 }
 
 /// The neighbourhood of a dying vertex, in the order of its triangles.
@@ -71,34 +76,64 @@ pub(crate) struct Patch {
 }
 
 impl<'a> Deviation<'a> {
+    /// `most` is the cost above which nothing is collapsed.
     pub(crate) fn new(
         mesh: &MeshView<'a>,
         px: &'a (dyn Fn(Vec3, Vec3) -> f32 + Sync),
         looks: Option<Looks<'a>>,
+        most: f32,
     ) -> Self {
-        Self { px, bounds: vec![0.0; mesh.indices.len() / 3], looks, patch: Patch::default() }
+        let bounds = vec![0.0; mesh.indices.len() / 3];
+        Self { px, bounds, looks, most, patch: Patch::default(), stars: Stars::default() }
     }
 
-    /// The bound after `from` went onto `onto`, and the cost, which counts looks too; pixels.
-    fn price(&mut self, mesh: &LiveMesh, from: u32, onto: u32) -> (f32, f32) {
-        const NEVER: (f32, f32) = (f32::INFINITY, f32::INFINITY);
-        if !self.patch.gather(mesh, from, onto) {
-            return NEVER;
-        }
-        let (p, length) = (mesh.position(from), mesh.position(from).distance(mesh.position(onto)));
-        let moved = self.patch.distance(mesh, from, onto).unwrap_or(length);
-        let scale = if length > 0.0 {
+    /// Pixels a scene unit at a place, along a segment of some length.
+    fn scale(&self, p: Vec3, length: f32) -> f32 {
+        if length > 0.0 {
             Vec3::AXES.iter().map(|&x| (self.px)(p, p + x * length)).fold(0.0, f32::max) / length
         } else {
             0.0
-        };
+        }
+    }
+
+    /// The bound after `from` went onto `onto`, the pixels of a scene unit there, and the normal of the plane that was projected onto, zero
+    /// where there is none. `None` where the collapse would leave an edge that is no surface.
+    fn bound(&mut self, mesh: &LiveMesh, from: u32, onto: u32) -> Option<(f32, f32, Vec3)> {
+        let (p, length) = (mesh.position(from), mesh.position(from).distance(mesh.position(onto)));
+        if let Some(star) = self.stars.of(mesh, from, &self.bounds) {
+            let (before, longest) = (star.before, star.longest);
+            let (moved, normal) = match star.distance(onto) {
+                Some(d) => (d, star.normal),
+                None => (length, Vec3::ZERO),
+            };
+            let scale = self.scale(p, longest);
+            return Some((before + moved * scale, scale, normal));
+        }
+        if !self.patch.gather(mesh, from, onto) {
+            return None;
+        }
+        let moved = self.patch.distance(mesh, from, onto).unwrap_or(length);
+        let longest = self.patch.spokes.iter().map(|s| mesh.position(s.0).distance(p)).fold(length, f32::max);
+        let scale = self.scale(p, longest);
         let before = mesh.triangles_of(from).iter().map(|&t| self.bounds[t as usize]).fold(0.0, f32::max);
-        let bound = before + moved * scale;
-        let cost = match &mut self.looks {
-            Some(looks) => bound.hypot(looks.off(mesh, &self.patch, from, onto) * scale),
-            None => bound,
-        };
-        (bound, if cost.is_finite() { cost } else { f32::INFINITY })
+        Some((before + moved * scale, scale, self.patch.normal))
+    }
+
+    /// The cost of `from` going onto `onto`, which counts looks too; pixels.
+    fn price(&mut self, mesh: &LiveMesh, from: u32, onto: u32) -> f32 {
+        let Some((bound, scale, normal)) = self.bound(mesh, from, onto) else { return f32::INFINITY };
+        // Looks only make it dearer.
+        if bound.is_nan() || bound > self.most {
+            return f32::INFINITY;
+        }
+        let Some(looks) = &mut self.looks else { return bound };
+        if !self.patch.gather(mesh, from, onto) {
+            return f32::INFINITY;
+        }
+        self.patch.normal = normal;
+        let left = (self.most * self.most - bound * bound).sqrt() / scale;
+        let cost = bound.hypot(looks.off(mesh, &self.patch, from, onto, left) * scale);
+        if cost.is_finite() { cost } else { f32::INFINITY }
     }
 }
 
@@ -106,7 +141,7 @@ impl Cost for Deviation<'_> {
     fn costs(&mut self, mesh: &LiveMesh, edges: &[[u32; 2]], out: &mut [Candidate]) {
         for (&[a, b], out) in edges.iter().zip(out) {
             let mut way = |from: u32, onto: u32| {
-                if mesh.is_locked(from) { f32::INFINITY } else { self.price(mesh, from, onto).1 }
+                if mesh.is_locked(from) { f32::INFINITY } else { self.price(mesh, from, onto) }
             };
             let (first, second) = (way(b, a), way(a, b));
             *out = if first <= second {
@@ -118,7 +153,10 @@ impl Cost for Deviation<'_> {
     }
 
     fn collapsed(&mut self, mesh: &LiveMesh, from: u32, onto: u32, _at: Vec3) {
-        let (bound, _) = self.price(mesh, from, onto);
+        let Some((bound, _, normal)) = self.bound(mesh, from, onto) else { return };
+        self.patch.gather(mesh, from, onto);
+        self.patch.normal = normal;
+        self.stars.forget();
         for &(t, _) in &self.patch.moved {
             self.bounds[t as usize] = bound;
         }
@@ -365,6 +403,41 @@ mod tests {
             let out = simplified(&positions, indices, f32::MAX, settings);
             let bound = out.max_cost * (1.0 + 1e-5) + 1e-6;
             assert!(!out.indices.is_empty() && sampled(&positions, indices, &out.indices, 16) <= bound);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_fast_way_and_the_general_one_agree(
+            heights in prop::collection::vec((0.3f32..1.5, -0.4f32..0.4), 3..16), tip in -0.4f32..0.4, onto in 0usize..16
+        ) {
+            let n = heights.len();
+            let place = |(i, &(r, h)): (usize, &(f32, f32))| {
+                let (s, c) = (i as f32 * std::f32::consts::TAU / n as f32).sin_cos();
+                Vec3::new(r * c, r * s, h)
+            };
+            let mut positions: Vec<Vec3> = heights.iter().enumerate().map(place).collect();
+            positions.push(Vec3::Z * tip);
+            let (from, onto) = (n as u32, (onto % n) as u32);
+            let indices: Vec<u32> = (0..n as u32).flat_map(|i| [from, i, (i + 1) % n as u32]).collect();
+            let mesh = LiveMesh::new(&positions, &indices, &[]).unwrap();
+            let (mut patch, mut stars) = (Patch::default(), Stars::default());
+            prop_assert!(patch.gather(&mesh, from, onto) || n == 3);
+            let slow = patch.distance(&mesh, from, onto);
+            let star = stars.of(&mesh, from, &vec![0.25; n]).unwrap();
+            prop_assert_eq!(star.before, 0.25);
+            match (star.distance(onto), slow) {
+                (None, None) => {}
+                (Some(a), Some(b)) => prop_assert!((a - b).abs() <= 1e-4, "{a} {b}"),
+                (a, b) => {
+                    // On the edge of folding rounding may decide otherwise.
+                    let least = (0..n).map(|i| {
+                        let p = |k: usize| positions[(onto as usize + k) % n].truncate();
+                        (p(i) - p(0)).perp_dot(p(i + 1) - p(0)).abs()
+                    });
+                    prop_assert!(least.fold(f32::INFINITY, f32::min) < 1e-3, "{a:?} {b:?}");
+                }
+            }
         }
     }
 

@@ -7,6 +7,7 @@ mod hausdorff;
 mod quadric;
 mod self_occlusion;
 mod silhouette_weighted;
+mod star;
 mod void_surface;
 
 pub use appearance::Appearance;

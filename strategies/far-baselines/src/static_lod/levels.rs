@@ -11,7 +11,7 @@ use farfield_core::collapse::{
 };
 use farfield_core::context::Context;
 use farfield_core::payload::MeshPart;
-use farfield_core::scene::{Gathered, Texture, Wedge};
+use farfield_core::scene::{Gathered, Texture};
 use glam::Vec3;
 
 use super::StaticLod;
@@ -46,7 +46,7 @@ pub(super) fn levels(
         return Ok(out);
     }
     let original = Original::new(source, textures);
-    let wedges = wedges_of(source);
+    let wedges = source.wedges_of_vertices();
     let (mut two_sided, mut quadrics) = (source.two_sided.clone(), None);
     // A chain may end early: ids of levels are counted to a bound.
     while target(corners.len()) >= own.least_triangles as usize && out.len() < MOST_LEVELS as usize {
@@ -69,7 +69,7 @@ pub(super) fn levels(
                 corners[t as usize].map(|w| {
                     let wedge = &source.wedges[w as usize];
                     let vertex = left.remap[wedge.vertex as usize];
-                    if vertex == wedge.vertex { w } else { alike(source, &wedges[vertex as usize], wedge) }
+                    if vertex == wedge.vertex { w } else { source.alike(&wedges[vertex as usize], wedge) }
                 })
             })
             .collect();
@@ -80,7 +80,7 @@ pub(super) fn levels(
         }
         two_sided = left.triangles.iter().map(|&t| two_sided[t as usize]).collect();
         let error = original.deviation(&kept, own.max_albedo_off).max(out.last().map_or(0.0, |l| l.error));
-        out.push(Level { parts: parts(source, &kept, &two_sided), corners: kept.clone(), error });
+        out.push(Level { parts: source.parts(&kept, &two_sided), corners: kept.clone(), error });
         corners = kept;
     }
     Ok(out)
@@ -124,39 +124,4 @@ impl Cost for Coloured<'_> {
 
 fn unit(c: [u8; 4]) -> Vec3 {
     Vec3::new(f32::from(c[0]), f32::from(c[1]), f32::from(c[2])) / 255.0
-}
-
-/// For each vertex its wedges.
-fn wedges_of(source: &Gathered) -> Vec<Vec<u32>> {
-    let mut out = vec![vec![]; source.positions.len()];
-    (0u32..).zip(&source.wedges).for_each(|(i, w)| out[w.vertex as usize].push(i));
-    out
-}
-
-/// The wedge that looks most like another: least squared difference of normals and of albedo (over 255), the first of equals.
-fn alike(source: &Gathered, among: &[u32], to: &Wedge) -> u32 {
-    let off = |w: &u32| {
-        let w = &source.wedges[*w as usize];
-        w.normal.distance_squared(to.normal) + unit(w.albedo).distance_squared(unit(to.albedo))
-    };
-    among.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or_default()
-}
-
-fn parts(source: &Gathered, corners: &[[u32; 3]], two_sided: &[bool]) -> Vec<MeshPart> {
-    let of = |two: bool| {
-        let mut part = MeshPart { two_sided: two, ..MeshPart::default() };
-        let mut local = vec![u32::MAX; source.wedges.len()];
-        for &w in corners.iter().zip(two_sided).filter(|(_, t)| **t == two).flat_map(|(c, _)| c) {
-            let (at, wedge) = (&mut local[w as usize], &source.wedges[w as usize]);
-            if *at == u32::MAX {
-                *at = part.positions.len() as u32;
-                part.positions.push(source.positions[wedge.vertex as usize]);
-                part.normals.push(wedge.normal);
-                part.albedo.push(wedge.albedo);
-            }
-            part.indices.push(*at);
-        }
-        part
-    };
-    [false, true].map(of).into_iter().filter(|p| !p.indices.is_empty()).collect()
 }

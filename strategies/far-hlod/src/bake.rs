@@ -1,0 +1,176 @@
+//! Bottom-up construction (section 3): a node is simplified from the nodes two levels below it, up to the edge of its cube over the resolution.
+//!
+//! Depth first, so that only the meshes beside the path to the root are in memory; subtrees of [`PARALLEL_DEPTH`] in parallel.
+
+use farfield_core::context::{Context, collect};
+use farfield_core::id::LocalPayload;
+use farfield_core::payload::{MeshPart, Part, Payload};
+use farfield_core::scene::{Gathered, gather};
+use farfield_core::strategy::{SceneJob, Sink};
+use farfield_core::{Aabb, Fault};
+use glam::{DVec3, Vec3};
+
+use crate::PointPolygonHlod;
+use crate::cone::Cone;
+use crate::piece::Piece;
+use crate::rounding::{Grid, normal};
+use crate::skeleton::{Node, Skeleton};
+use crate::texture;
+use crate::tree::{Borders, Tree};
+
+/// Subtrees whose roots stand this deep are independent jobs: up to 64.
+const PARALLEL_DEPTH: u32 = 2;
+
+/// A built subtree: what the levels above still need of it.
+struct Built {
+    piece: Piece,
+    /// Empty for a leaf.
+    children: Vec<Piece>,
+    /// Of all nodes in it, in order.
+    nodes: Vec<Node>,
+}
+
+struct Baker<'a> {
+    own: &'a PointPolygonHlod,
+    job: &'a SceneJob<'a>,
+    out: &'a dyn Sink,
+    cx: &'a Context<'a>,
+    tree: Tree,
+    borders: Borders,
+    grid: Grid,
+    origin: DVec3,
+}
+
+/// Builds the whole tree.
+pub(crate) fn bake(
+    own: &PointPolygonHlod,
+    job: &SceneJob<'_>,
+    out: &dyn Sink,
+    cx: &Context<'_>,
+) -> Result<Skeleton, Fault> {
+    let tree = Tree::over(job.scene, own.node_triangles);
+    if tree.len() == 0 {
+        return Ok(Skeleton::default());
+    }
+    // The grid's cells are parts of the smallest error that any node is allowed.
+    let deepest = (0..tree.len() as u32).map(|n| tree.allowance(n, own.resolution)).fold(f32::INFINITY, f32::min);
+    let grid = Grid::at_most(deepest / own.grid_steps as f32, tree.edge);
+    let origin = grid.origin(job.scene.bounds.centre());
+    let borders = Borders::find(job.scene, &tree, cx)?;
+    let baker = Baker { own, job, out, cx, tree, borders, grid, origin };
+    let nodes = &baker.tree.octree.nodes;
+    let jobs: Vec<u32> = (0..nodes.len() as u32)
+        .filter(|&n| {
+            let depth = nodes[n as usize].depth;
+            depth == PARALLEL_DEPTH || (depth < PARALLEL_DEPTH && baker.tree.is_leaf(n))
+        })
+        .collect();
+    let mut built = jobs.iter().copied().zip(collect(cx.run, jobs.len(), &|i| baker.subtree(jobs[i]))?);
+    let whole = baker.top(0, &mut built)?;
+    Ok(Skeleton { nodes: whole.nodes })
+}
+
+impl Baker<'_> {
+    /// The nodes above the subtrees, which come in order.
+    fn top(&self, node: u32, built: &mut dyn Iterator<Item = (u32, Built)>) -> Result<Built, Fault> {
+        let depth = self.tree.octree.nodes[node as usize].depth;
+        if depth == PARALLEL_DEPTH || self.tree.is_leaf(node) {
+            let next = built.next().filter(|b| b.0 == node);
+            return next.map(|b| b.1).ok_or_else(|| Fault::Refused("point-polygon-hlod: a subtree is missing".into()));
+        }
+        let children: Vec<u32> = self.tree.octree.children(node).collect();
+        let below = children.iter().map(|&c| self.top(c, built)).collect::<Result<Vec<_>, _>>()?;
+        self.inner(node, below)
+    }
+
+    fn subtree(&self, node: u32) -> Result<Built, Fault> {
+        self.cx.check()?;
+        if self.tree.is_leaf(node) {
+            return self.leaf(node);
+        }
+        let below = self.tree.octree.children(node).map(|c| self.subtree(c)).collect::<Result<Vec<_>, _>>()?;
+        self.inner(node, below)
+    }
+
+    fn leaf(&self, node: u32) -> Result<Built, Fault> {
+        let (scene, own) = (self.job.scene, &self.tree.octree.nodes[node as usize]);
+        let mut mesh = gather(scene, own.chunks.iter().copied(), self.origin)?;
+        // Rounding to 32 bits around the scene's middle counts too.
+        let error = texture::off(&mesh, &scene.textures, self.own.max_albedo_off) + self.tree.edge * f32::EPSILON;
+        mesh.textured = vec![];
+        let spans = mesh.names.iter().map(|&n| self.borders.span(n, node)).collect();
+        let piece = Piece { mesh, spans, error };
+        let node = Node { chunks: own.chunks.clone(), ..self.put(node, &piece, &[])? };
+        Ok(Built { piece, children: vec![], nodes: vec![node] })
+    }
+
+    fn inner(&self, node: u32, below: Vec<Built>) -> Result<Built, Fault> {
+        let sources: Vec<&Piece> = below
+            .iter()
+            .flat_map(|b| if b.children.is_empty() { std::slice::from_ref(&b.piece) } else { &b.children })
+            .collect();
+        let allowance = self.tree.allowance(node, self.own.resolution);
+        let mut piece = Piece::joined(&sources);
+        piece.smooth(&self.tree.below(node), allowance);
+        let piece = piece.simplified(&self.tree.below(node), allowance - self.grid.error(), &*self.own.metric)?;
+        let roots: Vec<&Node> = below.iter().filter_map(|b| b.nodes.first()).collect();
+        let own = self.put(node, &piece, &roots)?;
+        let mut nodes = vec![own];
+        let mut children = vec![];
+        for b in below {
+            nodes.extend(b.nodes);
+            children.push(b.piece);
+        }
+        Ok(Built { piece, children, nodes })
+    }
+
+    /// Rounds and stores a node's geometry.
+    fn put(&self, node: u32, piece: &Piece, children: &[&Node]) -> Result<Node, Fault> {
+        let mut parts = piece.mesh.parts(&piece.mesh.corners, &piece.mesh.two_sided);
+        for p in &mut parts {
+            p.positions.iter_mut().for_each(|p| *p = self.grid.round(*p));
+            p.normals.iter_mut().for_each(|n| *n = normal(*n));
+        }
+        let cones: Vec<Cone> = children.iter().map(|c| c.cone).collect();
+        let cone = if parts.iter().any(|p| p.two_sided) { Cone::ALL } else { cone(piece, &parts, &cones) };
+        let local = |p: &Vec3| (self.origin + p.as_dvec3()).as_vec3();
+        let bounds = Aabb::of(parts.iter().flat_map(|p| &p.positions).map(local));
+        let whole = children.iter().map(|c| c.bounds).fold(bounds, Aabb::union);
+        let whole = whole.union(self.tree.octree.nodes[node as usize].loose);
+        let own = Node {
+            bounds: whole,
+            error: piece.error + self.grid.error(),
+            cone,
+            end: self.tree.below(node).end,
+            depth: self.tree.octree.nodes[node as usize].depth as u8,
+            parts: parts.len() as u8,
+            triangles: piece.mesh.corners.len() as u32,
+            bytes: parts.iter().map(MeshPart::bytes).sum(),
+            object: most(&piece.mesh) + 1,
+            chunks: vec![],
+        };
+        if !parts.is_empty() {
+            let parts = parts.into_iter().map(Part::Mesh).collect();
+            self.out.put(LocalPayload(node), &Payload { origin: self.origin, bounds, parts })?;
+        }
+        Ok(own)
+    }
+}
+
+/// Over the triangles as they are drawn, as they were before rounding, and over what is below.
+fn cone(piece: &Piece, parts: &[MeshPart], below: &[Cone]) -> Cone {
+    let face = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a).try_normalize();
+    let before = piece.mesh.corners.iter().filter_map(|&c| face(piece.mesh.places(c)));
+    let drawn = parts.iter().flat_map(|p| {
+        p.indices.chunks_exact(3).filter_map(move |t| face([t[0], t[1], t[2]].map(|i| p.positions[i as usize])))
+    });
+    Cone::over(before.chain(drawn), below)
+}
+
+/// The object of most triangles, the first of equals; 0 where there are none.
+fn most(mesh: &Gathered) -> u32 {
+    let mut objects: Vec<u32> = mesh.corners.iter().map(|&c| mesh.names[mesh.vertices(c)[0] as usize].0.0).collect();
+    objects.sort_unstable();
+    let runs = objects.chunk_by(|a, b| a == b);
+    runs.fold((0, 0), |most, run| if run.len() > most.1 { (run[0], run.len()) } else { most }).0
+}
