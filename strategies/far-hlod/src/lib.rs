@@ -170,3 +170,6 @@ impl FarField for PointPolygonHlod {
         Ok(Box::new(view::Hierarchy { asset, skeleton, max_px: self.max_px }))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -33,12 +33,14 @@ pub(crate) struct Star {
 
 /// Stars by vertex, as long as nothing collapses.
 pub(crate) struct Stars {
-    slots: Vec<Option<Star>>,
+    /// Each with the number of collapses before it.
+    slots: Vec<Option<(u64, Star)>>,
+    collapses: u64,
 }
 
 impl Default for Stars {
     fn default() -> Self {
-        Self { slots: vec![None; REMEMBERED] }
+        Self { slots: vec![None; REMEMBERED], collapses: 0 }
     }
 }
 
@@ -46,15 +48,15 @@ impl Stars {
     /// The star of a vertex; `None` where it is no inner vertex of a surface, or has too many neighbours.
     pub(crate) fn of(&mut self, mesh: &LiveMesh, vertex: u32, bounds: &[f32]) -> Option<&Star> {
         let slot = &mut self.slots[vertex as usize % REMEMBERED];
-        if slot.as_ref().is_none_or(|s| s.vertex != vertex) {
-            *slot = Some(Star::new(mesh, vertex, bounds));
+        if slot.as_ref().is_none_or(|(at, s)| s.vertex != vertex || *at != self.collapses) {
+            *slot = Some((self.collapses, Star::new(mesh, vertex, bounds)));
         }
-        slot.as_ref().filter(|s| s.count > 0)
+        slot.as_ref().map(|s| &s.1).filter(|s| s.count > 0)
     }
 
     /// Something collapsed.
     pub(crate) fn forget(&mut self) {
-        self.slots.iter_mut().for_each(|s| *s = None);
+        self.collapses += 1;
     }
 }
 
