@@ -24,6 +24,7 @@ pub mod id;
 pub mod image;
 pub mod layered;
 pub mod mesh;
+pub mod octahedral;
 pub mod octree;
 pub mod panorama;
 pub mod path;

@@ -11,7 +11,7 @@ use farfield_core::strategy::{LeftOut, Sink};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::{Key, Store, key};
+use super::{Key, Store, key, pack};
 
 /// One payload's block.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -82,7 +82,7 @@ impl<'a> Recorder<'a> {
 impl Sink for Recorder<'_> {
     fn put(&self, id: LocalPayload, payload: &Payload) -> Result<(), Fault> {
         let key = key("payload", &[&self.asset, &id.0.to_le_bytes()]);
-        let bytes = self.store.put(&key, &encode(payload)?).map_err(|e| stored(&e))?;
+        let bytes = self.store.put(&key, &pack(payload)?).map_err(|e| stored(&e))?;
         let made = Stored { key, bytes, triangles: payload.triangles(), texture_bytes: payload.texture_bytes() };
         let mut m = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         match m.payloads.insert(id, made) {

@@ -7,6 +7,7 @@
 mod keys;
 mod manifest;
 mod memo;
+mod meshes;
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -16,6 +17,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub use keys::{Key, key};
 pub use manifest::{Manifest, Recorder, Stored, decode, encode};
 pub use memo::StoreMemo;
+pub use meshes::{pack, unpack};
 
 /// Begins every block.
 const MAGIC: &[u8; 4] = b"FFB1";

@@ -91,7 +91,7 @@ fn a_bake_is_recorded_whatever_the_order_of_its_claims() {
         }
         assert!(r.put(LocalPayload(order[0]), &payload()).is_err());
         let m = r.finish(vec![7]).unwrap();
-        let back: Payload = decode(&s.get(&m.payloads[&LocalPayload(1)].key).unwrap()).unwrap();
+        let back = unpack(&s.get(&m.payloads[&LocalPayload(1)].key).unwrap()).unwrap();
         assert_eq!(back, payload());
         assert_eq!(decode::<Manifest>(&s.get(&key("asset", &[])).unwrap()).unwrap(), m);
         m

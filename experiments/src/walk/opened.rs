@@ -17,7 +17,7 @@ use super::residency::Residency;
 use crate::build::{Built, BuiltCell, Division};
 use crate::config::Pipeline;
 use crate::failure::Failure;
-use crate::store::{Manifest, Store, Stored, decode};
+use crate::store::{Manifest, Store, Stored, unpack};
 
 /// The asset of the scene; those of cells follow.
 const SHARED: AssetId = AssetId(0);
@@ -119,7 +119,7 @@ impl<'a> Opened<'a> {
     /// [`Fault::Data`] where it is not there or not what was written.
     pub fn fetch(&self, block: Block) -> Result<Payload, Fault> {
         let gone = || Fault::Data { place: format!("{block:?}"), cause: "it is not in the store".into() };
-        decode(&self.store.get(&self.stored(block).ok_or_else(gone)?.key).ok_or_else(gone)?)
+        unpack(&self.store.get(&self.stored(block).ok_or_else(gone)?.key).ok_or_else(gone)?)
     }
 
     /// Every payload block of a cell, its scene's asset included.

@@ -4,6 +4,7 @@
 
 use farfield_core::context::{Context, collect};
 use farfield_core::id::LocalPayload;
+use farfield_core::octahedral::{FINE_BITS, rounded};
 use farfield_core::payload::{MeshPart, Part, Payload};
 use farfield_core::scene::{Gathered, gather};
 use farfield_core::strategy::{SceneJob, Sink};
@@ -13,7 +14,7 @@ use glam::{DVec3, Vec3};
 use crate::PointPolygonHlod;
 use crate::cone::Cone;
 use crate::piece::Piece;
-use crate::rounding::{Grid, normal};
+use crate::rounding::Grid;
 use crate::skeleton::{Node, Skeleton};
 use crate::texture;
 use crate::tree::{Borders, Tree};
@@ -129,7 +130,7 @@ impl Baker<'_> {
         let mut parts = piece.mesh.parts(&piece.mesh.corners, &piece.mesh.two_sided);
         for p in &mut parts {
             p.positions.iter_mut().for_each(|p| *p = self.grid.round(*p));
-            p.normals.iter_mut().for_each(|n| *n = normal(*n));
+            p.normals.iter_mut().for_each(|n| *n = rounded(*n, FINE_BITS));
         }
         let cones: Vec<Cone> = children.iter().map(|c| c.cone).collect();
         let cone = if parts.iter().any(|p| p.two_sided) { Cone::ALL } else { cone(piece, &parts, &cones) };
