@@ -60,6 +60,13 @@ pub struct MeshChunk {
     pub material: MaterialId,
 }
 
+impl MeshChunk {
+    /// Bytes of the chunk in memory: position, normal, texture coordinate, colour and name a vertex, three indices a triangle.
+    pub fn bytes(&self) -> u64 {
+        u64::from(self.vertices) * 40 + u64::from(self.triangles) * 12
+    }
+}
+
 impl TriangleMesh {
     /// Number of triangles.
     pub fn triangles(&self) -> usize {

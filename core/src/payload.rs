@@ -116,6 +116,13 @@ impl ProjectedPart {
     }
 }
 
+impl MeshPart {
+    /// Bytes in memory: position, normal and albedo a vertex, three indices a triangle.
+    pub fn bytes(&self) -> u64 {
+        28 * self.positions.len() as u64 + 4 * self.indices.len() as u64
+    }
+}
+
 impl Payload {
     /// Triangles in all its parts.
     pub fn triangles(&self) -> u64 {

@@ -14,8 +14,6 @@ use farfield_core::strategy::{Achieved, Candidate, CellJob, Covers, FarField, Fa
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::chunk_bytes;
-
 /// All geometry, near and far.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -79,7 +77,7 @@ impl FarView for Plain {
                 let info = &view.scene.meshes[c.source.mesh.index()].chunks[c.source.chunk as usize];
                 out.push(Candidate {
                     block: Block::Chunk(c.source),
-                    bytes: chunk_bytes(info.vertices, info.triangles),
+                    bytes: info.bytes(),
                     bounds: c.bounds,
                     error_px_without: f32::INFINITY,
                     in_view: !self.frustum_culling || view.camera.may_see(&c.bounds),

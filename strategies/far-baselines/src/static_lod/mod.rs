@@ -112,7 +112,7 @@ impl StaticLod {
                     "static-lod: object {id} has more than {MOST_LEVELS} levels, or is one of too many; lower ratio"
                 )));
             };
-            let bytes = level.parts.iter().map(part_bytes).sum();
+            let bytes = level.parts.iter().map(MeshPart::bytes).sum();
             let at = |p: &glam::Vec3| (source.origin + p.as_dvec3()).as_vec3();
             let bounds = Aabb::of(level.parts.iter().flat_map(|p| &p.positions).map(at));
             let (parts, triangles) = (level.parts.len() as u16, level.corners.len() as u32);
@@ -122,11 +122,6 @@ impl StaticLod {
         }
         Ok((!entries.is_empty()).then_some(Chain { object: id, levels: entries }))
     }
-}
-
-/// Position, normal and albedo a vertex, three indices a triangle.
-fn part_bytes(p: &MeshPart) -> u64 {
-    28 * p.positions.len() as u64 + 4 * p.indices.len() as u64
 }
 
 #[typetag::serde(name = "static-lod")]

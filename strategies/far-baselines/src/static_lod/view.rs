@@ -9,7 +9,6 @@ use farfield_core::scene::{ChunkSet, Object};
 use farfield_core::strategy::{Achieved, Candidate, FarView, View};
 
 use super::index::{Entry, Index};
-use crate::chunk_bytes;
 
 /// What a view's tolerance stands for, pixels.
 const TOLERANCE_PX: f32 = 0.5;
@@ -69,7 +68,7 @@ impl FarView for Levels {
                         let block = Block::Chunk(placed.source);
                         let known = chunks.entry(block).or_insert(Candidate {
                             block,
-                            bytes: chunk_bytes(info.vertices, info.triangles),
+                            bytes: info.bytes(),
                             bounds: placed.bounds,
                             error_px_without: px,
                             in_view: false,
