@@ -26,7 +26,8 @@
 //!   error allowed (`keep_textures`).
 //! * Objects do not know each other: where two touch, they may gape by their errors. Within an object nothing gapes, but where one-sided
 //!   triangles meet two-sided ones their shared vertices never go.
-//! * What does not simplify (soups of unconnected triangles, many small closed parts) stays as it is.
+//! * Soups of unconnected triangles (leaves) thin out: a triangle that goes is off by its own size, and that many of them are gone is no
+//!   error to the simplifier.
 //!
 //! Bake: O(n log n) an object for n triangles, groups in parallel; one object's mesh in memory, of small ones one a thread. Stored: about as
 //! many triangles as the original has. A frame: O(groups of the objects in view).

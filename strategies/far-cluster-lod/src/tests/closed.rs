@@ -64,7 +64,7 @@ proptest! {
 fn cuts_go_from_the_original_to_a_few_triangles_and_mix_both_within_one_view() {
     for (what, b) in all() {
         let original = b.scene.triangles() as usize;
-        let eye = b.scene.bounds.max;
+        let eye = b.scene.bounds.max + 0.3;
         let counts: Vec<usize> =
             (0..14).map(|k| check(what, b, &draw(&fine(), b, &seen_from(eye, 0.5f32.powi(k)), &|_| true).0)).collect();
         assert!(counts.is_sorted(), "{what}: {counts:?}");
@@ -108,19 +108,22 @@ fn a_broken_cut_has_border_edges() {
     };
     assert_eq!(border_edges(&draws(&cut)), 0);
     // A group alone decides otherwise than what lies below it allows; or one that is below an applied one steps back.
-    let (mut tried, groups) = (0, 0..object.groups.len());
+    let (mut tried, mut torn, groups) = (0, 0, 0..object.groups.len());
     for g in groups {
         let lone_above = !cut.applied[g] && !below[g].iter().all(|&b| cut.applied[b as usize]);
         let lone_below = cut.applied[g]
             && object.groups[g].parts.iter().any(|p| p.replaced_by.is_some_and(|h| cut.applied[h as usize]));
         if lone_above || lone_below {
             cut.applied[g] = !cut.applied[g];
-            assert!(border_edges(&draws(&cut)) > 0, "group {g}");
+            // Where the whole surface hangs on that one group, it is there twice instead, or not at all.
+            let (edges, around) = (border_edges(&draws(&cut)), winding(&draws(&cut), Vec3::ZERO));
+            assert!(edges > 0 || (around - 1.0).abs() > 0.9, "group {g}");
+            torn += usize::from(edges > 0);
             cut.applied[g] = !cut.applied[g];
             tried += 1;
         }
     }
-    assert!(tried > 10, "{tried}");
+    assert!(tried > 10 && 2 * torn > tried, "{torn} of {tried}");
     // A missing part is seen, too.
     let mut all = draws(&cut);
     all.truncate(all.len() - 1);
