@@ -5,15 +5,15 @@
 //! FARFIELD_MODELS=../models cargo bench -p farfield-integration-tests --bench clusters [-- FILE ...]
 //! ```
 //!
-//! Files are paths within the models' folder. Errors are relative to the diagonal of the model's box. Each row draws the whole model with the same
+//! Time is the building thread's processor time where the system tells it. Files are paths within the models' folder. Errors are relative to the diagonal of the model's box. Each row draws the whole model with the same
 //! error allowed everywhere; `measured` are distances of 200,000 random points of either surface, spread by area, from the other one, the
 //! largest and the 99.9th percentile; `exceeded` is the largest over the largest error that any drawn group states.
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
+use std::sync::{Mutex, OnceLock};
+use std::time::{Duration, Instant};
 
 use farfield_core::bvh::TriangleBvh;
 use farfield_core::camera::ViewModel;
@@ -103,6 +103,16 @@ fn distances(from: &Surface, to: &Surface) -> Vec<f32> {
     out
 }
 
+/// Processor time of this thread where the system tells it, else time since the first call.
+fn now() -> Duration {
+    // Linux counts at its ticks, milliseconds apart, and whenever a thread gives way.
+    std::thread::yield_now();
+    static START: OnceLock<Instant> = OnceLock::new();
+    let scheduled = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let nanos = scheduled.and_then(|s| s.split(' ').next()?.parse().ok());
+    nanos.map_or_else(|| START.get_or_init(Instant::now).elapsed(), Duration::from_nanos)
+}
+
 fn table(name: &str, scene: &Scene, own: &ClusterLod, more: &str) -> Result<(), Error> {
     let (sink, go) = (Keep::default(), AtomicBool::new(false));
     let cx = Context { capture: &NoCapture, run: &Serial, memo: &Forget, cancel: &go };
@@ -115,9 +125,9 @@ fn table(name: &str, scene: &Scene, own: &ClusterLod, more: &str) -> Result<(), 
         max_speed: 1.0,
         max_turn_rad: 1.0,
     };
-    let start = Instant::now();
+    let start = now();
     let index = own.bake_scene(&SceneJob { scene, views: &views }, &sink, &cx)?;
-    let seconds = start.elapsed().as_secs_f64();
+    let seconds = (now() - start).as_secs_f64();
     let payloads = sink.0.into_inner()?;
     let (triangles, stored) = (scene.triangles(), payloads.values().map(Payload::triangles).sum::<u64>());
     println!(
@@ -179,7 +189,7 @@ fn main() -> Result<(), Error> {
         let mesh = b.mesh(file, mesh)?;
         b.place(Placement { mesh, transform: DAffine3::IDENTITY });
         let scene = b.build()?;
-        for weight in [0.0, 0.1, 0.5] {
+        for weight in [0.0, 0.5] {
             let own = ClusterLod { normal_weight: weight, albedo_weight: weight, ..ClusterLod::default() };
             table(file, &scene, &own, &format!("weights {weight}"))?;
         }

@@ -7,11 +7,11 @@
 use farfield_core::registry::{Entry, Kind, settings_of};
 
 pub use {
-    farfield_far_baselines as far_baselines, farfield_far_cluster_lod as far_cluster_lod, farfield_far_itdm as far_itdm, farfield_far_ldi as far_ldi,
-    farfield_far_textured_mesh as far_textured_mesh, farfield_metrics as metrics,
-    farfield_partition_adaptive_grid as partition_adaptive_grid, farfield_partition_hex as partition_hex,
-    farfield_partition_octree as partition_octree, farfield_partition_single_cell as partition_single_cell,
-    farfield_schedulers as schedulers,
+    farfield_far_baselines as far_baselines, farfield_far_cluster_lod as far_cluster_lod,
+    farfield_far_itdm as far_itdm, farfield_far_ldi as far_ldi, farfield_far_textured_mesh as far_textured_mesh,
+    farfield_metrics as metrics, farfield_partition_adaptive_grid as partition_adaptive_grid,
+    farfield_partition_hex as partition_hex, farfield_partition_octree as partition_octree,
+    farfield_partition_single_cell as partition_single_cell, farfield_schedulers as schedulers,
 };
 
 /// The paper of the textured LOD meshes, before a section's number.

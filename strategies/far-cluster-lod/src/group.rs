@@ -8,7 +8,7 @@
 //! meshoptimizer's error is an estimate: the root of a weighted mean of squared distances to the planes around a vertex, with
 //! attributes' differences added. It is no bound on any distance. O(n log n) for n triangles.
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 
 use farfield_core::Fault;
 use farfield_core::scene::Gathered;
@@ -42,13 +42,10 @@ pub(crate) fn simplify(
     locked: &[bool],
 ) -> Result<Option<Simplified>, Fault> {
     // Vertices of the group alone: what is done here must not depend on the size of the whole.
-    let local: BTreeMap<u32, u32> = {
-        let mut used: Vec<u32> = corners.iter().flatten().copied().collect();
-        used.sort_unstable();
-        used.dedup();
-        used.into_iter().zip(0..).collect()
-    };
-    let wedges: Vec<u32> = local.keys().copied().collect();
+    let mut wedges: Vec<u32> = corners.iter().flatten().copied().collect();
+    wedges.sort_unstable();
+    wedges.dedup();
+    let local: HashMap<u32, u32> = wedges.iter().copied().zip(0..).collect();
     let vertex = |w: &u32| source.wedges[*w as usize].vertex as usize;
     let positions: Vec<Vec3> = wedges.iter().map(|w| source.positions[vertex(w)]).collect();
     if !positions.iter().all(|p| p.is_finite()) {

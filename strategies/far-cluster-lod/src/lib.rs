@@ -38,7 +38,7 @@ mod hierarchy;
 mod index;
 mod view;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use farfield_core::cell::Cell;
 use farfield_core::context::{Context, Executor, Serial, collect};
@@ -77,11 +77,11 @@ pub struct ClusterLod {
     #[schemars(range(min = 1), extend("unit" = "triangles"))]
     pub least_triangles: u32,
     /// The error that a difference of normals of length 1 stands for, in sizes of the group.
-    #[serde(default = "tenth")]
+    #[serde(default = "half")]
     #[schemars(range(min = 0.0))]
     pub normal_weight: f32,
     /// The error that a difference of albedo from black to white in a channel stands for, in sizes of the group.
-    #[serde(default = "tenth")]
+    #[serde(default = "half")]
     #[schemars(range(min = 0.0))]
     pub albedo_weight: f32,
     /// Losing a texture counts as an error as long as a triangle's edge: clusters have colours at vertices only.
@@ -101,8 +101,8 @@ fn sixteen() -> u32 {
 fn thirty_two() -> u32 {
     32
 }
-fn tenth() -> f32 {
-    0.1
+fn half() -> f32 {
+    0.5
 }
 fn yes() -> bool {
     true
@@ -115,8 +115,8 @@ impl Default for ClusterLod {
             cluster_triangles: cluster(),
             group_clusters: sixteen(),
             least_triangles: thirty_two(),
-            normal_weight: tenth(),
-            albedo_weight: tenth(),
+            normal_weight: half(),
+            albedo_weight: half(),
             keep_textures: yes(),
         }
     }
@@ -225,7 +225,7 @@ fn payload(source: &Gathered, made: &Hierarchy, parts: &BTreeMap<Option<u32>, Ve
     let mut patches = vec![];
     for (&replaced_by, units) in parts {
         let mut part = MeshPart::default();
-        let mut local = BTreeMap::new();
+        let mut local = HashMap::new();
         for &u in units {
             part.two_sided = made.units[u].two_sided;
             for &w in made.units[u].corners.iter().flatten() {
