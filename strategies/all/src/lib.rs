@@ -140,6 +140,13 @@ pub fn registry() -> Vec<Entry> {
         },
         Entry {
             kind: Kind::Scheduler,
+            name: "movement-priority",
+            summary: "Fetches in the order of the movement that the viewer would need before a block matters",
+            source: hierarchy!("4.3"),
+            settings: settings_of::<schedulers::MovementPriority>(),
+        },
+        Entry {
+            kind: Kind::Scheduler,
             name: "near-to-far-lru",
             summary: "Fetches what stands within a radius near to far, frees what was used longest ago",
             source: placement!("5"),
