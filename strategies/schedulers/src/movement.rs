@@ -139,12 +139,9 @@ pub(crate) mod tests {
     /// The least way along some of many directions after which culling lets the box through, scene units.
     pub(crate) fn tried_way(c: &Camera, b: &Aabb, most: f64) -> f64 {
         let seen = |to: DVec3| Camera { eye: c.eye + to, ..*c }.may_see(b);
-        let one = |i: u32| {
-            // Directions on a spiral by the golden angle.
-            let (z, a) = (1.0 - f64::from(2 * i + 1) / 2000.0, 2.399_963 * f64::from(i));
-            let direction = DVec3::new((1.0 - z * z).sqrt() * a.cos(), (1.0 - z * z).sqrt() * a.sin(), z);
-            let steps = (1..=400).map(|k| most * f64::from(k) / 400.0);
-            let Some(mut far) = steps.into_iter().find(|&way| seen(direction * way)) else { return f64::INFINITY };
+        let first = |direction: DVec3| {
+            let mut steps = (1..=400).map(|k| most * f64::from(k) / 400.0);
+            let Some(mut far) = steps.find(|&way| seen(direction * way)) else { return f64::INFINITY };
             let mut near = far - most / 400.0;
             for _ in 0..40 {
                 let middle = 0.5 * (near + far);
@@ -152,7 +149,20 @@ pub(crate) mod tests {
             }
             far
         };
-        (0..2000).map(one).fold(f64::INFINITY, f64::min)
+        // Directions on a spiral by the golden angle; then ever closer around the best.
+        let spiral = |i: u32, n: u32| {
+            let (z, a) = (1.0 - f64::from(2 * i + 1) / f64::from(n), 2.399_963 * f64::from(i));
+            DVec3::new((1.0 - z * z).sqrt() * a.cos(), (1.0 - z * z).sqrt() * a.sin(), z)
+        };
+        let all = (0..1000).map(|i| spiral(i, 1000)).map(|d| (first(d), d));
+        let shorter = |a: (f64, DVec3), b: (f64, DVec3)| if b.0 < a.0 { b } else { a };
+        let mut best = all.reduce(shorter).unwrap();
+        for round in 0..14 {
+            let (reach, around) = (0.2 * 0.7f64.powi(round), best.1);
+            let near = (0..40).map(|i| (around + spiral(i, 40) * reach).normalize());
+            best = near.map(|d| (first(d), d)).fold(best, shorter);
+        }
+        best.0
     }
 
     proptest! {
@@ -211,7 +221,7 @@ pub(crate) mod tests {
             }
             let shortest = tried_way(&c, &b, 40.0);
             prop_assert!(told <= shortest + 1e-5, "{told} against {shortest}");
-            prop_assert!(shortest <= 1.05 * told + 1e-4, "{told} against {shortest}");
+            prop_assert!(shortest <= 1.01 * told + 1e-3, "{told} against {shortest}");
         }
     }
 
@@ -219,10 +229,10 @@ pub(crate) mod tests {
     fn what_is_behind_beside_and_inside() {
         let c = Camera::looking(DVec3::ZERO, -Vec3::Z, Vec3::Y, std::f32::consts::FRAC_PI_2, [100, 100], 0.1);
         let at = |p: Vec3| Aabb { min: p - 1e-3, max: p + 1e-3 };
-        // A frustum of 90 degrees: straight behind is 135 away, to the side 45, and the way to the side is that to the plane.
+        // A frustum of 90 degrees: straight behind is acos(-1 / sqrt 3) from its corners, to the side 45 degrees from its plane.
         let behind = turn_rad(&c, &at(Vec3::Z * 5.0)).to_degrees();
         let beside = turn_rad(&c, &at(Vec3::X * 5.0)).to_degrees();
-        assert!((behind - 125.26).abs() < 0.1 || (behind - 135.0).abs() < 0.1, "{behind}");
+        assert!((behind - 125.26).abs() < 0.1, "{behind}");
         assert!((beside - 45.0).abs() < 0.1, "{beside}");
         assert!((way(&c, &at(Vec3::X * 5.0)) - 5.0 / 2f64.sqrt()).abs() < 0.01);
         assert!((way(&c, &at(Vec3::Z * 5.0)) - 5.0).abs() < 0.01, "{}", way(&c, &at(Vec3::Z * 5.0)));
