@@ -33,8 +33,8 @@ impl Cut {
     /// Every group that `within` lets through and that is above none that is not applied.
     pub(crate) fn allowed(object: &ObjectGroups, below: &[Vec<u32>], within: impl Fn(u32) -> bool) -> Self {
         let mut applied = vec![false; object.groups.len()];
-        for g in 0..applied.len() {
-            applied[g] = below[g].iter().all(|&b| applied[b as usize]) && within(g as u32);
+        for (g, own) in below.iter().enumerate() {
+            applied[g] = own.iter().all(|&b| applied[b as usize]) && within(g as u32);
         }
         Self { applied }
     }
@@ -115,8 +115,8 @@ impl Cut {
                 break;
             }
             lacking.into_iter().for_each(|g| self.applied[g as usize] = false);
-            for g in 0..self.applied.len() {
-                self.applied[g] &= below[g].iter().all(|&b| self.applied[b as usize]);
+            for (g, own) in below.iter().enumerate() {
+                self.applied[g] &= own.iter().all(|&b| self.applied[b as usize]);
             }
         }
         let there = |c: usize| !self.draws_chunk(object, c) || !(has.sees_chunk)(c) || (has.chunk)(c);
