@@ -268,6 +268,10 @@ pub trait Demand {
     fn of(&self, cell: CellId, from: &Camera, out: &mut Vec<Candidate>);
     /// Whether a block is there.
     fn resident(&self, block: Block) -> bool;
+    /// From the eye to a cell's region, scene units; by default 0: as if the eye were about to enter.
+    fn distance(&self, _cell: CellId, _eye: &Camera) -> f32 {
+        0.0
+    }
 }
 
 /// What to load, to free and to call off.

@@ -7,6 +7,9 @@ struct Readme;
 #[doc = include_str!("../../CONTRIBUTING.md")]
 struct Contributing;
 
+#[doc = include_str!("../../book/src/cluster-lod.md")]
+struct ClusterLod;
+
 #[doc = include_str!("../../book/src/depth-meshes.md")]
 struct DepthMeshes;
 

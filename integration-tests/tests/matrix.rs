@@ -23,7 +23,8 @@ const VARIANTS: [(&str, &str); 3] = [
 ];
 
 /// Far fields whose defaults are meant for larger pictures than these.
-const FITTED: [(&str, &str); 4] = [
+const FITTED: [(&str, &str); 5] = [
+    ("cluster-lod", "cluster_triangles = 32, group_clusters = 8"),
     ("incremental-tdm", "face_px = 256, sampling_px = 48, max_samples = 8"),
     ("static-lod", "max_px = 2.0, max_albedo_off = 64"),
     ("textured-depth-mesh", "face_px = 256"),

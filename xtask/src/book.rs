@@ -5,6 +5,7 @@ use std::process::Command;
 const PAGE: &str = "book/src/reference.md";
 
 pub(crate) fn run(check: bool) -> Result<(), String> {
+    crate::setup::compiler();
     let out = Command::new("cargo")
         .args(["run", "--quiet", "--release", "--", "list", "--markdown"])
         .output()

@@ -47,6 +47,7 @@ fn run(program: &str, args: &[&str]) -> Result<(), String> {
 }
 
 fn demo() -> Result<(), String> {
+    setup::compiler();
     setup::driver();
     run("cargo", &["run", "--release", "--", "run", "examples/park.toml", "--out", "out/park"])?;
     println!("The report is out/park/report.html");

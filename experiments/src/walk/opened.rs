@@ -291,4 +291,9 @@ impl Demand for Wants<'_> {
     fn resident(&self, block: Block) -> bool {
         self.residency.has(block)
     }
+
+    fn distance(&self, cell: CellId, eye: &Camera) -> f32 {
+        let outlines = self.opened.division.cells.outlines();
+        outlines[cell.index()].region.distance(&Aabb::of([eye.eye.as_vec3()]))
+    }
 }

@@ -7,8 +7,9 @@
 use farfield_core::registry::{Entry, Kind, settings_of};
 
 pub use {
-    farfield_far_baselines as far_baselines, farfield_far_hlod as far_hlod, farfield_far_itdm as far_itdm,
-    farfield_far_ldi as far_ldi, farfield_far_textured_mesh as far_textured_mesh, farfield_metrics as metrics,
+    farfield_far_baselines as far_baselines, farfield_far_cluster_lod as far_cluster_lod,
+    farfield_far_hlod as far_hlod, farfield_far_itdm as far_itdm, farfield_far_ldi as far_ldi,
+    farfield_far_textured_mesh as far_textured_mesh, farfield_metrics as metrics,
     farfield_partition_adaptive_grid as partition_adaptive_grid, farfield_partition_hex as partition_hex,
     farfield_partition_octree as partition_octree, farfield_partition_single_cell as partition_single_cell,
     farfield_schedulers as schedulers,
@@ -54,6 +55,13 @@ macro_rules! hierarchy {
 /// Every strategy, by kind, then by name.
 pub fn registry() -> Vec<Entry> {
     vec![
+        Entry {
+            kind: Kind::FarField,
+            name: "cluster-lod",
+            summary: "A hierarchy of clusters of triangles, cut to the view without cracks",
+            source: "Nanite: a deep dive (Karis, Stubbe, Wihlidal 2021), the part on cluster hierarchies",
+            settings: settings_of::<far_cluster_lod::ClusterLod>(),
+        },
         Entry {
             kind: Kind::FarField,
             name: "geometry",
@@ -137,6 +145,13 @@ pub fn registry() -> Vec<Entry> {
             summary: "Fetches what the active cell wants when it is entered, frees the rest",
             source: "farfield; the baseline without prefetching",
             settings: settings_of::<schedulers::LoadOnEntry>(),
+        },
+        Entry {
+            kind: Kind::Scheduler,
+            name: "movement-priority",
+            summary: "Fetches in the order of the movement that the viewer would need before a block matters",
+            source: hierarchy!("4.3"),
+            settings: settings_of::<schedulers::MovementPriority>(),
         },
         Entry {
             kind: Kind::Scheduler,
