@@ -31,6 +31,9 @@ struct LayeredDepthImages;
 #[doc = include_str!("../../book/src/measuring.md")]
 struct Measuring;
 
+#[doc = include_str!("../../book/src/point-polygon-hlod.md")]
+struct PointPolygonHlod;
+
 #[doc = include_str!("../../book/src/reference.md")]
 struct Reference;
 

@@ -23,9 +23,10 @@ const VARIANTS: [(&str, &str); 3] = [
 ];
 
 /// Far fields whose defaults are meant for larger pictures than these.
-const FITTED: [(&str, &str); 5] = [
+const FITTED: [(&str, &str); 6] = [
     ("cluster-lod", "cluster_triangles = 32, group_clusters = 8"),
     ("incremental-tdm", "face_px = 256, sampling_px = 48, max_samples = 8"),
+    ("point-polygon-hlod", "node_triangles = 500, resolution = 64, max_px = 1.0"),
     ("static-lod", "max_px = 2.0, max_albedo_off = 64"),
     ("textured-depth-mesh", "face_px = 256"),
     ("textured-lod-mesh", "edge_px = 1.0"),
