@@ -130,6 +130,17 @@ pub trait Sink: Sync {
     fn left_out(&self, what: LeftOut);
 }
 
+/// A level of a hierarchy of detail: its share in a census.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Level {
+    /// 0 for the coarsest.
+    pub level: u32,
+    /// Nodes of it.
+    pub nodes: u64,
+    /// Triangles of all its nodes; `None` as long as they are not built.
+    pub triangles: Option<u64>,
+}
+
 /// A far-field representation: its offline half. Three methods required.
 #[typetag::serde(tag = "type")]
 pub trait FarField: Send + Sync + Debug {
@@ -156,6 +167,15 @@ pub trait FarField: Send + Sync + Debug {
     /// # Errors
     /// As [`FarField::bake_cell`].
     fn bake_scene(&self, _job: &SceneJob<'_>, _out: &dyn Sink, _cx: &Context<'_>) -> Result<Vec<u8>, Fault> {
+        Ok(vec![])
+    }
+
+    /// The levels of its hierarchy, coarsest first, by the index of the scene's asset, or, where that is not built, as far as the scene alone
+    /// tells; by default it has none.
+    ///
+    /// # Errors
+    /// [`Fault::Data`] where the bytes are not what the bake wrote.
+    fn census(&self, _scene: &Scene, _shared: Option<&[u8]>) -> Result<Vec<Level>, Fault> {
         Ok(vec![])
     }
 

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use farfield_core::Camera;
 use farfield_core::cell::Split;
 use farfield_core::context::{Context, Forget};
-use farfield_core::strategy::{Covers, LeftOut};
+use farfield_core::strategy::{Covers, LeftOut, Level};
 use serde::Serialize;
 
 use crate::build::{NoCapture, Pool};
@@ -53,6 +53,9 @@ pub struct PipelinePlan {
     /// An upper estimate of the texels' bytes in memory, over all built cells: every far object's box as its cell's centre sees
     /// it, albedo and normal a pixel.
     pub estimated_texture_bytes: u64,
+    /// Levels of detail, where there will be a hierarchy of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<Level>,
     /// What is left out, and why.
     pub left_out: Vec<LeftOut>,
 }
@@ -116,6 +119,7 @@ fn of_pipeline(
         near_triangles_mean: near.iter().sum::<u64>() as f64 / near.len().max(1) as f64,
         near_triangles_max: near.iter().copied().max().unwrap_or(0),
         estimated_texture_bytes: texels * TEXEL_BYTES,
+        levels: p.far_field.census(scene, None).map_err(refused)?,
         left_out,
     })
 }
@@ -144,6 +148,10 @@ pub fn text(plan: &Plan) -> String {
         );
         out +=
             &format!("  near triangles a cell: {:.0} mean, {} at most\n", p.near_triangles_mean, p.near_triangles_max);
+        if !p.levels.is_empty() {
+            let nodes: Vec<String> = p.levels.iter().map(|l| l.nodes.to_string()).collect();
+            out += &format!("  nodes a level, coarsest first: {}\n", nodes.join(", "));
+        }
         if p.scene_asset {
             out += "  built once for the scene: yes\n";
         }

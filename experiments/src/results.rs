@@ -2,7 +2,7 @@
 
 use farfield_core::backend::DeviceInfo;
 use farfield_core::claim::Quantity;
-use farfield_core::strategy::LeftOut;
+use farfield_core::strategy::{LeftOut, Level};
 use serde::{Deserialize, Serialize};
 
 /// The version of [`Summary`]'s layout.
@@ -89,6 +89,9 @@ pub struct PipelineSummary {
     pub bounds: Vec<BoundAudit>,
     /// What was left out.
     pub left_out: Vec<LeftOut>,
+    /// Levels of detail, where there is a hierarchy of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<Level>,
 }
 
 /// What building cost.

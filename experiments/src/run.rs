@@ -333,7 +333,9 @@ impl One<'_> {
         let times: Vec<f64> = walked.iter().map(|w| w.frame_ms).collect();
         let ratios: Vec<f64> =
             walked.iter().filter_map(|w| w.cell).map(|c| walker.opened.original_over_simplified(c)).collect();
-        let Built { preprocess, left_out, .. } = walker.opened.built;
+        let Built { preprocess, left_out, shared, .. } = walker.opened.built;
+        let index = shared.as_ref().map(|s| s.1.index.as_slice());
+        let levels = self.pipeline().far_field.census(&p.scene, index).map_err(failed(p.cameras.len()))?;
         let floor = floor(&mut *device.backend, &p.views, &p.shading, FLOOR_FRAMES).map_err(failed(p.cameras.len()))?;
         let summary = PipelineSummary {
             name: name.clone(),
@@ -357,6 +359,7 @@ impl One<'_> {
             error: (!self.is_reference()).then(|| measure::summary(&errors, &changes)),
             bounds: self.bounds(&measured),
             left_out,
+            levels,
         };
         Ok((summary, rows))
     }

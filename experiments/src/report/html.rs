@@ -261,7 +261,9 @@ fn details(h: &mut String, s: &Summary) {
             ),
         );
     }
-    *h += "</ul><h2>Settings</h2>";
+    *h += "</ul>";
+    levels(h, &s.pipelines);
+    *h += "<h2>Settings</h2>";
     for p in &s.pipelines {
         let json = serde_json::to_string_pretty(&p.strategies).unwrap_or_default();
         push(
@@ -277,6 +279,28 @@ fn details(h: &mut String, s: &Summary) {
             ),
         );
     }
+}
+
+/// The census of hierarchies: nodes and triangles a level.
+fn levels(h: &mut String, pipelines: &[PipelineSummary]) {
+    if pipelines.iter().all(|p| p.levels.is_empty()) {
+        return;
+    }
+    *h += "<h2>Levels of detail</h2><table><tr><th>pipeline</th><th>level, coarsest first</th><th>nodes</th><th>triangles</th><th>a node</th></tr>";
+    for (p, l) in pipelines.iter().flat_map(|p| p.levels.iter().map(move |l| (p, l))) {
+        let triangles = l.triangles.map_or("-".into(), |t| t.to_string());
+        let mean = l.triangles.map_or("-".into(), |t| format!("{:.0}", t as f64 / l.nodes.max(1) as f64));
+        push(
+            h,
+            format_args!(
+                "<tr><td>{}</td><td>{}</td><td>{}</td><td>{triangles}</td><td>{mean}</td></tr>",
+                text(&p.name),
+                l.level,
+                l.nodes
+            ),
+        );
+    }
+    *h += "</table>";
 }
 
 fn series(frames: &[FrameRow], value: fn(&FrameRow) -> Option<f64>) -> Vec<(String, Vec<(f64, f64)>)> {

@@ -96,6 +96,7 @@ mod tests {
     use super::*;
     use crate::results::*;
     use farfield_core::backend::DeviceInfo;
+    use farfield_core::strategy::Level;
 
     fn summary() -> Summary {
         let pipeline = |name: &str, ms: f64, psnr: Option<f64>| PipelineSummary {
@@ -119,6 +120,7 @@ mod tests {
             }),
             bounds: vec![],
             left_out: vec![],
+            levels: vec![Level { level: 0, nodes: 3, triangles: Some(1234) }],
         };
         Summary {
             schema: SCHEMA,
@@ -152,6 +154,7 @@ mod tests {
         write(dir.path(), &summary(), &rows, &[shown]).unwrap();
         let html = std::fs::read_to_string(dir.path().join("report.html")).unwrap();
         assert!(html.contains("a &lt;scene&gt;") && html.contains("39.25") && html.contains("<svg"));
+        assert!(html.contains("<h2>Levels of detail</h2>") && html.contains("<td>1234</td><td>411</td>"));
         assert!(html.contains("data:image/png;base64,") && !html.contains("http://localhost"));
         let back: Summary =
             serde_json::from_str(&std::fs::read_to_string(dir.path().join("summary.json")).unwrap()).unwrap();

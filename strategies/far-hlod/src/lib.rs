@@ -44,7 +44,7 @@ use farfield_core::context::Context;
 use farfield_core::id::AssetId;
 use farfield_core::scene::Scene;
 use farfield_core::strategy::{
-    CellJob, Covers, FarField, FarView, LeftOut, Needs, SceneJob, SimplificationMetric, Sink,
+    CellJob, Covers, FarField, FarView, LeftOut, Level, Needs, SceneJob, SimplificationMetric, Sink,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -143,6 +143,30 @@ impl FarField for PointPolygonHlod {
             covers: Covers::Everything,
             left_out: left_out.into_iter().collect(),
         })
+    }
+
+    fn census(&self, scene: &Scene, shared: Option<&[u8]>) -> Result<Vec<Level>, Fault> {
+        let mut levels: Vec<Level> = vec![];
+        let mut count = |depth: u32, triangles: Option<u64>| {
+            while levels.len() <= depth as usize {
+                levels.push(Level { level: levels.len() as u32, nodes: 0, triangles: triangles.map(|_| 0) });
+            }
+            let own = &mut levels[depth as usize];
+            own.nodes += 1;
+            own.triangles = own.triangles.zip(triangles).map(|(a, b)| a + b);
+        };
+        match shared {
+            Some(bytes) => {
+                let skeleton = Skeleton::decode(NAME, bytes)?;
+                skeleton.nodes.iter().for_each(|n| count(n.depth.into(), Some(n.triangles.into())));
+            }
+            None => {
+                self.check()?;
+                let tree = tree::Tree::over(scene, self.node_triangles);
+                tree.octree.nodes.iter().for_each(|n| count(n.depth, None));
+            }
+        }
+        Ok(levels)
     }
 
     fn frame_settings(&self) -> &'static [&'static str] {

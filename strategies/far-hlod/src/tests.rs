@@ -350,6 +350,19 @@ fn the_same_bytes_in_any_order_of_jobs() {
 }
 
 #[test]
+fn the_census_counts_every_node_once_before_and_after() {
+    let b = baked(balls(false), settings("hausdorff"), &Serial);
+    let (planned, built) = (b.far.census(&b.scene, None).unwrap(), b.far.census(&b.scene, Some(&b.index)).unwrap());
+    let counts = |c: &[Level]| c.iter().map(|l| (l.level, l.nodes)).collect::<Vec<_>>();
+    assert_eq!(counts(&planned), counts(&built));
+    assert_eq!(planned.iter().map(|l| l.nodes).sum::<u64>(), b.skeleton.nodes.len() as u64);
+    assert!(planned.iter().all(|l| l.triangles.is_none()));
+    let triangles: u64 = b.payloads.values().map(Payload::triangles).sum();
+    assert_eq!(built.iter().map(|l| l.triangles.unwrap()).sum::<u64>(), triangles);
+    assert!(b.far.census(&b.scene, Some(&b.index[1..])).is_err());
+}
+
+#[test]
 fn textures_that_vertices_do_not_show_count_and_can_be_let_go() {
     let scene = || {
         let mut b = SceneBuilder::default();
