@@ -59,7 +59,10 @@ impl Skeleton {
 
     pub(crate) fn decode(place: &str, bytes: &[u8]) -> Result<Self, Fault> {
         let bad = |cause: String| Fault::Data { place: place.to_owned(), cause };
-        let all: Self = postcard::from_bytes(bytes).map_err(|e| bad(e.to_string()))?;
+        let (all, rest): (Self, _) = postcard::take_from_bytes(bytes).map_err(|e| bad(e.to_string()))?;
+        if !rest.is_empty() {
+            return Err(bad(format!("{} bytes after its end", rest.len())));
+        }
         let count = all.nodes.len() as u32;
         for (i, n) in (0u32..).zip(&all.nodes) {
             // Written so that NaN fails.
