@@ -21,7 +21,9 @@ mod obj;
 mod part;
 mod ply;
 mod polygon;
+mod sink;
 mod stl;
+pub mod stream;
 mod texture;
 
 use std::path::Path;
