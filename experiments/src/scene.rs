@@ -251,7 +251,11 @@ pub fn write_asteroid(file: &Path, triangles: Option<u64>, seed: u64) -> Result<
         _ => Failure::work(format!("{} cannot be written", file.display()), e),
     };
     let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut out = std::io::BufWriter::new(tempfile::NamedTempFile::new_in(folder).map_err(failed)?);
+    let mut new = tempfile::Builder::new();
+    // As any other file: the user's mask decides who may read it.
+    #[cfg(unix)]
+    new.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut out = std::io::BufWriter::new(new.tempfile_in(folder).map_err(failed)?);
     let made = generate::asteroid::write_ply(&settings, &mut out).map_err(failed)?;
     let whole = out.into_inner().map_err(|e| failed(e.into_error()))?;
     whole.persist(file).map_err(|e| failed(e.error))?;

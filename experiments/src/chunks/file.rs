@@ -125,7 +125,7 @@ impl ChunkFile {
         };
         once().or_else(|_| once()).map_err(|cause| Fault::Data {
             place: format!("{}: {}", self.path.display(), what()),
-            cause: format!("{cause} (read twice); without the file it is made anew"),
+            cause: format!("{cause} (read twice); delete the file to have it made anew"),
         })
     }
 }

@@ -27,7 +27,11 @@ impl Writer {
     /// # Errors
     /// What making the file gives.
     pub fn new(aside: &Path) -> io::Result<Self> {
-        let file = tempfile::Builder::new().prefix(&format!("{}-", std::process::id())).tempfile_in(aside)?;
+        let mut file = tempfile::Builder::new();
+        // As any other file: the user's mask decides who may read it.
+        #[cfg(unix)]
+        file.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let file = file.prefix(&format!("{}-", std::process::id())).tempfile_in(aside)?;
         let mut file = BufWriter::with_capacity(1 << 20, file);
         file.write_all(&[0; HEADER])?;
         let digest = ChunkDigest::default();

@@ -16,6 +16,7 @@ mod error;
 mod folder;
 mod gltf;
 mod gltf_accessor;
+mod gltf_stream;
 mod mtl;
 mod obj;
 mod part;

@@ -72,6 +72,7 @@ impl Places {
     }
 
     /// How many there are.
+    #[cfg(test)]
     pub(super) fn len(&self) -> usize {
         match self {
             Self::Range(r) => r.len(),

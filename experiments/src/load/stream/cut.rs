@@ -222,19 +222,19 @@ impl<C: Corner> Scope<'_, '_, C> {
         let at = Places::of(corners.iter().map(|c| c.position()).collect());
         let positions = intake.positions.gather(&at)?;
         out.positions = corners.iter().map(|c| self.place(positions[at.slot(c.position())])).collect();
-        if let Some(colors) = intake.colors.as_ref().filter(|_| self.mesh.colors) {
+        if let Some(colors) = intake.colors.array.as_ref().filter(|_| self.mesh.colors) {
             let all = colors.gather(&at)?;
             out.colors =
                 corners.iter().map(|c| all[at.slot(c.position())]).map(|[r, g, b, _]| [r, g, b, 255]).collect();
         }
-        if let Some(uvs) = intake.uvs.as_ref().filter(|_| self.mesh.uvs) {
+        if let Some(uvs) = intake.uvs.array.as_ref().filter(|_| self.mesh.uvs) {
             let at = Places::of(corners.iter().filter_map(|c| c.uv()).collect());
             let all = uvs.gather(&at)?;
             let uv = |c: &C| c.uv().map(|i| Vec2::from(all[at.slot(i)])).filter(|uv| uv.is_finite());
             out.uvs = corners.iter().map(|c| uv(c).unwrap_or_default()).collect();
         }
         let mut given = vec![None; corners.len()];
-        if let Some(normals) = intake.normals.as_ref().filter(|_| self.mesh.normals_given) {
+        if let Some(normals) = intake.normals.array.as_ref().filter(|_| self.mesh.normals_given) {
             let at = Places::of(corners.iter().filter_map(|c| c.normal()).collect());
             let all = normals.gather(&at)?;
             let normal = |c: &C| c.normal().and_then(|i| Vec3::from(all[at.slot(i)]).try_normalize());

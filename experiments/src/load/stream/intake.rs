@@ -49,15 +49,44 @@ impl Mesh {
     }
 }
 
+/// An attribute, in a file as soon as anything has it.
+pub(super) struct Attribute<T> {
+    pub(super) array: Option<Array<T>>,
+    /// What stands for none.
+    missing: T,
+    /// How many have none, before the first that has it.
+    skipped: u64,
+}
+
+impl<T: bytemuck::Pod> Attribute<T> {
+    fn new(missing: T) -> Self {
+        Self { array: None, missing, skipped: 0 }
+    }
+
+    fn push(&mut self, folder: &Path, value: Option<T>) -> std::io::Result<()> {
+        match (&mut self.array, value) {
+            (None, None) => {
+                self.skipped += 1;
+                Ok(())
+            }
+            (Some(array), value) => array.push(value.unwrap_or(self.missing)),
+            (None, Some(value)) => {
+                let array = self.array.insert(Array::filled(folder, self.skipped, self.missing)?);
+                array.push(value)
+            }
+        }
+    }
+}
+
 /// Everything that was read.
 pub(super) struct Intake<'a, C> {
     pub(super) file: &'a Path,
     pub(super) work: &'a Work<'a>,
     pub(super) positions: Array<[f64; 3]>,
-    pub(super) normals: Option<Array<[f32; 3]>>,
-    pub(super) uvs: Option<Array<[f32; 2]>>,
+    pub(super) normals: Attribute<[f32; 3]>,
+    pub(super) uvs: Attribute<[f32; 2]>,
     /// Alpha 0 where a vertex has none.
-    pub(super) colors: Option<Array<[u8; 4]>>,
+    pub(super) colors: Attribute<[u8; 4]>,
     pub(super) triangles: Array<[C; 3]>,
     pub(super) meshes: Vec<Mesh>,
     pub(super) degenerate: u64,
@@ -74,9 +103,9 @@ impl<'a, C: Corner> Intake<'a, C> {
             file,
             work,
             positions: Array::new(work.folder).map_err(failed)?,
-            normals: None,
-            uvs: None,
-            colors: None,
+            normals: Attribute::new([0.0; 3]),
+            uvs: Attribute::new(NO_UV),
+            colors: Attribute::new([255, 255, 255, 0]),
             triangles: Array::new(work.folder).map_err(failed)?,
             meshes: vec![],
             degenerate: 0,
@@ -99,9 +128,9 @@ impl<'a, C: Corner> Intake<'a, C> {
 
     fn flush(&mut self) -> std::io::Result<()> {
         self.positions.flush()?;
-        self.normals.iter_mut().try_for_each(Array::flush)?;
-        self.uvs.iter_mut().try_for_each(Array::flush)?;
-        self.colors.iter_mut().try_for_each(Array::flush)
+        self.normals.array.iter_mut().try_for_each(Array::flush)?;
+        self.uvs.array.iter_mut().try_for_each(Array::flush)?;
+        self.colors.array.iter_mut().try_for_each(Array::flush)
     }
 
     /// Splits the faces that wait into triangles, checks these and appends them to the last mesh.
@@ -117,14 +146,14 @@ impl<'a, C: Corner> Intake<'a, C> {
         let mesh = self.meshes.last_mut().expect("faces follow a mesh");
         let ends = places.ends();
         mesh.positions = mesh.positions.start.min(ends.start)..mesh.positions.end.max(ends.end);
-        mesh.colors = mesh.colors || given(self.colors.as_ref(), &places, |c| c[3] != 0).map_err(&failed)?;
+        mesh.colors = mesh.colors || given(self.colors.array.as_ref(), &places, |c| c[3] != 0).map_err(&failed)?;
         if !mesh.uvs {
             let named: Vec<u32> = corners.iter().filter_map(|c| c.uv()).collect();
             let is = |uv: &[f32; 2]| uv.map(f32::to_bits) != NO_UV.map(f32::to_bits);
-            mesh.uvs = given(self.uvs.as_ref(), &Places::of(named), is).map_err(&failed)?;
+            mesh.uvs = given(self.uvs.array.as_ref(), &Places::of(named), is).map_err(&failed)?;
         }
         let normal_places = Places::of(corners.iter().filter_map(|c| c.normal()).collect());
-        let normals = match &self.normals {
+        let normals = match &self.normals.array {
             Some(n) => n.gather(&normal_places).map_err(&failed)?,
             None => vec![],
         };
@@ -212,30 +241,18 @@ impl<C: Corner> Sink<C> for Intake<'_, C> {
 
     fn color(&mut self, c: Option<[u8; 4]>) -> Result<(), LoadError> {
         let failed = self.failed();
-        if self.colors.is_none() && c.is_some() {
-            // All before have none.
-            let before = Array::filled(self.work.folder, self.positions.len() - 1, [255, 255, 255, 0]);
-            self.colors = Some(before.map_err(&failed)?);
-        }
-        let c = c.map_or([255, 255, 255, 0], |[r, g, b, _]| [r, g, b, 255]);
-        self.colors.as_mut().map_or(Ok(()), |a| a.push(c)).map_err(failed)
+        self.colors.push(self.work.folder, c.map(|[r, g, b, _]| [r, g, b, 255])).map_err(failed)
     }
 
     fn uv(&mut self, uv: Option<Vec2>) -> Result<(), LoadError> {
         let failed = self.failed();
-        if self.uvs.is_none() {
-            self.uvs = Some(Array::new(self.work.folder).map_err(&failed)?);
-        }
-        let uv = uv.map_or(NO_UV, |uv| if uv.is_finite() { uv.to_array() } else { [0.0; 2] });
-        self.uvs.as_mut().map_or(Ok(()), |a| a.push(uv)).map_err(failed)
+        let uv = uv.map(|uv| if uv.is_finite() { uv.to_array() } else { [0.0; 2] });
+        self.uvs.push(self.work.folder, uv).map_err(failed)
     }
 
     fn normal(&mut self, n: Option<Vec3>) -> Result<(), LoadError> {
         let failed = self.failed();
-        if self.normals.is_none() {
-            self.normals = Some(Array::new(self.work.folder).map_err(&failed)?);
-        }
-        self.normals.as_mut().map_or(Ok(()), |a| a.push(n.unwrap_or_default().to_array())).map_err(failed)
+        self.normals.push(self.work.folder, n.map(|n| n.to_array())).map_err(failed)
     }
 
     fn face(&mut self, corners: &[C], material: u32, place: u32) -> Result<(), LoadError> {

@@ -21,12 +21,13 @@ mod spill;
 mod tests;
 mod weld;
 
+use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use farfield_core::id::TextureId;
-use farfield_core::scene::{Material, Placement, SceneBuilder, Texture};
+use farfield_core::scene::{Placement, SceneBuilder, Texture};
 use glam::{DAffine3, DVec3};
 
 use self::cut::{MIRROR, Scope};
@@ -34,7 +35,7 @@ use self::intake::Intake;
 use super::bytes::Input;
 use super::sink::Corner;
 use super::texture::Textures;
-use super::{LoadError, LoadOptions, folder, obj, ply, root};
+use super::{LoadError, LoadOptions, folder, gltf, obj, ply, root};
 use crate::chunks::{ChunkFile, Kept, Writer, identity};
 use crate::store::{Store, key};
 
@@ -115,6 +116,7 @@ pub fn bytes(path: &Path) -> Result<Option<u64>, LoadError> {
 enum Format {
     Ply,
     Obj,
+    Gltf,
 }
 
 impl Format {
@@ -124,6 +126,7 @@ impl Format {
         match stem.rsplit_once('.')?.1 {
             "ply" => Some(Self::Ply),
             "obj" => Some(Self::Obj),
+            "gltf" | "glb" => Some(Self::Gltf),
             _ => None,
         }
     }
@@ -181,14 +184,24 @@ fn beside_is(kept: &Kept, folder: &Path, store: &Store) -> bool {
     kept.beside.iter().all(|(name, digest)| identity::digest(store, &folder.join(name)).ok() == *digest)
 }
 
+/// A file for positioned reads: itself, or what a gzipped one unpacks to.
+fn unpacked(file: &Path, folder: &Path) -> Result<File, LoadError> {
+    let failed = |cause| LoadError::Read { file: file.to_owned(), cause };
+    let mut input = Input::open(file)?;
+    if input.left().is_some() {
+        return File::open(file).map_err(failed);
+    }
+    let mut out = tempfile::tempfile_in(folder).map_err(|e| LoadError::temporary(folder, e))?;
+    let copied = io::copy(&mut input, &mut out);
+    copied.map_err(|e| LoadError::data(file, "gzip stream", e.to_string()))?;
+    Ok(out)
+}
+
 /// A file that has been read.
 struct Read<'a, C> {
     intake: Intake<'a, C>,
-    materials: Vec<Material>,
     textures: Textures,
-    warnings: Vec<String>,
-    /// Meshes and their transforms.
-    placements: Vec<(usize, DAffine3)>,
+    beside: gltf::Beside,
     /// Whether all meshes stand in one space, once each.
     flat: bool,
 }
@@ -199,38 +212,33 @@ fn make(files: &[PathBuf], folder: &Path, home: &Path, keep: &Keep<'_>) -> Resul
     let failed = |e| LoadError::temporary(&aside, e);
     let mut writer = Writer::new(&aside).map_err(failed)?;
     for file in files {
+        let mut textures = Textures::default();
         match Format::of(file) {
             Some(Format::Ply) => {
-                let (mut intake, mut textures) = (Intake::new(file, &work)?, Textures::default());
+                let mut intake = Intake::new(file, &work)?;
                 let (material, warnings) = ply::parse(file, Input::open(file)?, &mut intake, &mut textures)?;
-                intake.finish()?;
                 let (materials, placements) = (vec![material], vec![(0, DAffine3::IDENTITY)]);
-                append(
-                    Read { intake, materials, textures, warnings, placements, flat: true },
-                    &mut writer,
-                    folder,
-                    keep,
-                )?;
+                let beside = gltf::Beside { materials, warnings, placements };
+                append(Read { intake, textures, beside, flat: true }, &mut writer, folder, keep)?;
             }
             Some(Format::Obj) => {
-                let (mut intake, mut textures) = (Intake::new(file, &work)?, Textures::default());
+                let mut intake = Intake::new(file, &work)?;
                 let mut input = Input::open(file)?;
                 if input.starts_with(&[0xfe, 0xff]) || input.starts_with(&[0xff, 0xfe]) {
                     return Err(LoadError::unsupported(file, "UTF-16 text", WHOLE));
                 }
                 let (materials, warnings) = obj::parse(file, &mut input, &mut intake, &mut textures)?;
-                intake.finish()?;
                 let placements = (0..intake.meshes.len()).map(|i| (i, DAffine3::IDENTITY)).collect();
-                append(
-                    Read { intake, materials, textures, warnings, placements, flat: true },
-                    &mut writer,
-                    folder,
-                    keep,
-                )?;
+                let beside = gltf::Beside { materials, warnings, placements };
+                append(Read { intake, textures, beside, flat: true }, &mut writer, folder, keep)?;
             }
-            None => {
-                return Err(LoadError::unsupported(file, "this format", WHOLE));
+            Some(Format::Gltf) => {
+                let mut intake = Intake::new(file, &work)?;
+                let plain = unpacked(file, &aside)?;
+                let beside = gltf::stream(file, plain, work.batch as u64, &mut intake, &mut textures)?;
+                append(Read { intake, textures, beside, flat: false }, &mut writer, folder, keep)?;
             }
+            None => return Err(LoadError::unsupported(file, "this format", WHOLE)),
         }
     }
     writer.finish(home).map_err(|e| LoadError::temporary(home.parent().unwrap_or(home), e))
@@ -238,7 +246,9 @@ fn make(files: &[PathBuf], folder: &Path, home: &Path, keep: &Keep<'_>) -> Resul
 
 /// Cuts what was read into the chunk file, after what is in it.
 fn append<C: Corner>(read: Read<'_, C>, writer: &mut Writer, folder: &Path, keep: &Keep<'_>) -> Result<(), LoadError> {
-    let Read { mut intake, materials, textures, mut warnings, placements, flat } = read;
+    let Read { mut intake, textures, beside, flat } = read;
+    let gltf::Beside { materials, mut warnings, placements } = beside;
+    intake.finish()?;
     let work = intake.work;
     let failed = |e| LoadError::temporary(work.folder, e);
     let origin = checked(&intake, flat)?;
