@@ -163,6 +163,8 @@ pub enum LightKind {
 }
 
 /// The only way to triangles: a chunk's, while a call lasts. In memory, mapped, or loaded in blocks.
+///
+/// What is held may be limited, so that `f` neither reads geometry itself nor waits for others that do.
 pub trait Geometry: Send + Sync {
     /// Calls `f` once with the chunk.
     ///

@@ -98,7 +98,7 @@ pub struct SceneSettings {
     /// Whether surfaces are seen from behind too; without it as the file says (generated scenes: false).
     pub two_sided: Option<bool>,
     /// Whether a model is cut into a file of the store, of which triangles are read while they are used; without it where the model's
-    /// files are larger than an eighth of `memory_bytes` and can be read piece by piece (.ply, .obj, .gltf and .glb).
+    /// files (counted threefold where gzipped) are larger than a fifth of `memory_bytes` and can be read piece by piece: .ply, .obj, .gltf, .glb.
     pub out_of_core: Option<bool>,
     /// Out of core, the most bytes of original triangles that are held at once, and about the most while a model is cut.
     #[schemars(range(min = 16_777_216), extend("unit" = "bytes"))]

@@ -125,13 +125,17 @@ impl Grid {
         let spacing = RADIUS * std::f32::consts::FRAC_PI_2 / self.n as f32;
         let p = out * RADIUS;
         let lumps = fbm(p, 160.0, 14, spacing, self.seed);
-        let craters = [(48.0, 5.0), (17.0, 1.6), (6.0, 0.5), (2.0, 0.15), (0.7, 0.05)]
+        let bowl = |c: f32| {
+            let t = ((c - 0.5) / 0.4).clamp(0.0, 1.0);
+            t * t * (3.0 - 2.0 * t)
+        };
+        let craters = [(48.0, 7.0), (17.0, 2.5), (6.0, 0.9), (2.0, 0.3), (0.7, 0.1)]
             .iter()
             .zip(1_u32..)
-            .map(|(&(width, depth), k)| depth * cells(p, width, spacing, self.seed.wrapping_add(77 * k)))
+            .map(|(&(width, depth), k)| depth * bowl(cells(p, width, spacing, self.seed.wrapping_add(77 * k))))
             .sum::<f32>();
-        let height = 22.0 * lumps - craters;
-        let tone = (0.45 + 0.015 * height - 0.02 * craters).clamp(0.1, 0.9);
+        let height = 26.0 * lumps - craters;
+        let tone = (0.7 + 0.012 * height - 0.015 * craters).clamp(0.2, 0.95);
         let color = [255.0 * tone, 245.0 * tone, 230.0 * tone].map(|v| v as u8);
         // Longer than it is wide, and flatter.
         let p = out * (RADIUS + height) * Vec3::new(1.0, 0.72, 0.85);

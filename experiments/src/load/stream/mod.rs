@@ -96,7 +96,7 @@ pub struct Streamed {
     pub warnings: Vec<String>,
 }
 
-/// The bytes of a file or of a folder's model files; `None` where one of them cannot be read piece by piece.
+/// The bytes of a file or of a folder's model files, gzipped ones counted threefold; `None` where one of them cannot be read piece by piece.
 ///
 /// # Errors
 /// What looking at the files gives.
@@ -107,7 +107,8 @@ pub fn bytes(path: &Path) -> Result<Option<u64>, LoadError> {
         if Format::of(&file).is_none() {
             return Ok(None);
         }
-        sum += std::fs::metadata(&file).map_err(|cause| LoadError::Read { file, cause })?.len();
+        let unpacks = if file.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) { 3 } else { 1 };
+        sum += unpacks * std::fs::metadata(&file).map_err(|cause| LoadError::Read { file, cause })?.len();
     }
     Ok(Some(sum))
 }
