@@ -10,7 +10,7 @@
 //! The chunk file is in the store, `scenes/`, by the digest of the input's contents; files beside the input (material libraries,
 //! textures, buffers) are named in it with theirs and looked at again when it is opened.
 //!
-//! Not streamed: STL, whose corners have to be welded before anything is known of its vertices. Duplicate triangles are kept, as in
+//! Limits: 2^32 vertices and triangles a file. Not streamed: STL, whose corners have to be welded before anything is known of its vertices. Duplicate triangles are kept, as in
 //! memory, but not counted.
 
 mod array;
