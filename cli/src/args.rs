@@ -135,7 +135,7 @@ pub(crate) enum Command {
         /// What to generate.
         #[arg(value_parser = PossibleValuesParser::new(Generated::ALL.map(Generated::name)).map(named))]
         kind: Generated,
-        /// Triangles in all; without it 262,879 of a house, 2,017,700 of a park, 1,000,000 of pipes and of a plant.
+        /// Triangles in all; without it 262,879 of a house, 2,017,700 of a park, 1,000,000 of pipes, of a plant and of an asteroid.
         #[arg(long)]
         triangles: Option<u64>,
         /// Seed.

@@ -106,9 +106,14 @@ fn compare(runs: &[PathBuf], out: &Path) -> Result<(), Failure> {
 }
 
 fn generate(kind: Generated, triangles: Option<u64>, seed: u64, out: &Path) -> Result<(), Failure> {
+    if kind == Generated::Asteroid && out.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply")) {
+        let written = scene::write_asteroid(out, triangles, seed)?;
+        return print(&format!("{}: {written} triangles, 1 object\n", out.display()));
+    }
     let parts = scene::generate(kind, triangles, seed)?;
     let (written, objects) = (parts.triangles(), parts.placements.len());
     let what = match kind {
+        Generated::Asteroid => "object",
         Generated::House => "objects",
         Generated::Park => "statues",
         Generated::Pipes | Generated::Plant => "parts",

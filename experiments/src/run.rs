@@ -46,6 +46,13 @@ pub struct Options<'a> {
     pub say: &'a (dyn Fn(&str) + Sync),
 }
 
+/// For tests that keep nothing.
+#[cfg(test)]
+pub(crate) fn nothing_kept() -> Options<'static> {
+    static NEVER: AtomicBool = AtomicBool::new(false);
+    Options { store: PathBuf::new(), quiet: true, cancel: &NEVER, say: &|line| eprintln!("{line}") }
+}
+
 /// An experiment with its scene, path and cells: everything that needs no building.
 pub struct Prepared {
     /// The scene.
@@ -69,7 +76,7 @@ pub struct Prepared {
 /// # Errors
 /// [`Failure::Input`]: nothing has been written.
 pub fn prepare(experiment: &Experiment, options: &Options<'_>) -> Result<Prepared, Failure> {
-    let loaded = scene::scene(experiment)?;
+    let loaded = scene::scene(experiment, options)?;
     loaded.warnings.iter().for_each(|w| (options.say)(&format!("warning: {w}")));
     let scene = Arc::new(loaded.scene);
     let views = path::views(&experiment.view, &scene);

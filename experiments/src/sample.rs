@@ -47,7 +47,7 @@ pub fn at(
     if out.is_dir() {
         return refused("it is a folder");
     }
-    let loaded = scene::scene(experiment)?;
+    let loaded = scene::scene(experiment, options)?;
     loaded.warnings.iter().for_each(|w| (options.say)(&format!("warning: {w}")));
     let scene = Arc::new(loaded.scene);
     let near = path::views(&experiment.view, &scene).near;

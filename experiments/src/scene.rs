@@ -12,11 +12,14 @@ use crate::config::{Experiment, Generated, LightSettings, SceneSettings, Up};
 use crate::export::{Export, ExportError, export};
 use crate::failure::Failure;
 use crate::generate::{
-    self, HouseScene, HouseSettings, PAPER_MODELS, ParkScene, ParkSettings, PipesScene, PipesSettings, PlantScene,
-    PlantSettings, house, park, park_of, pipes, plant,
+    self, AsteroidSettings, HouseScene, HouseSettings, PAPER_MODELS, ParkScene, ParkSettings, PipesScene,
+    PipesSettings, PlantScene, PlantSettings, asteroid, house, park, park_of, pipes, plant,
 };
-use crate::load::{self, LoadOptions};
+use crate::load::stream::{self, Keep};
+use crate::load::{self, LoadError, LoadOptions};
 use crate::path::{ROUNDING, Route};
+use crate::run::Options;
+use crate::store::Store;
 
 /// A loaded or generated scene.
 pub struct Loaded {
@@ -34,29 +37,68 @@ pub struct Loaded {
 ///
 /// # Errors
 /// [`Failure::Input`] with the file, the place and the cause.
-pub fn scene(experiment: &Experiment) -> Result<Loaded, Failure> {
+pub fn scene(experiment: &Experiment, options: &Options<'_>) -> Result<Loaded, Failure> {
     let s = &experiment.scene;
     let to_world = DAffine3::from_translation(DVec3::from(s.offset)) * DAffine3::from_scale(DVec3::splat(s.scale));
     match &s.path {
-        Some(path) => file(s, path),
+        Some(path) => file(s, path, options),
         None => generated(s, to_world),
     }
 }
 
-fn file(s: &SceneSettings, path: &str) -> Result<Loaded, Failure> {
+/// What a model takes in memory while it is loaded whole, in bytes of its file: 4.3 were measured on binary PLY, the densest.
+const WHOLE_TAKES: u64 = 5;
+
+fn file(s: &SceneSettings, path: &str, options: &Options<'_>) -> Result<Loaded, Failure> {
     let up = match s.up {
         Up::Y => load::Up::Y,
         Up::Z => load::Up::Z,
     };
-    let options = LoadOptions { up, scale: s.scale, two_sided: s.two_sided };
+    let how = LoadOptions { up, scale: s.scale, two_sided: s.two_sided };
     let refused = |e: &dyn ToString| Failure::input("the scene was not loaded", e.to_string());
-    let mut imported = load::load(Path::new(path), &options).map_err(|e| refused(&e))?;
-    imported.builder.shift(DVec3::from(s.offset));
-    let scene = imported.builder.build().map_err(|e| refused(&e))?;
+    let stream = match s.out_of_core {
+        Some(chosen) => chosen,
+        None => {
+            let bytes = stream::bytes(Path::new(path)).map_err(|e| refused(&e))?;
+            bytes.is_some_and(|b| b > s.memory_bytes / WHOLE_TAKES)
+        }
+    };
+    let (scene, warnings) = if stream {
+        streamed(s, Path::new(path), &how, options)?
+    } else {
+        let mut imported = load::load(Path::new(path), &how).map_err(|e| refused(&e))?;
+        imported.builder.shift(DVec3::from(s.offset));
+        (imported.builder.build().map_err(|e| refused(&e))?, imported.warnings)
+    };
     if scene.triangles() == 0 {
         return Err(refused(&format!("{path}: there is no triangle in it")));
     }
-    Ok(Loaded { scene, source: path.to_owned(), warnings: imported.warnings, route: None })
+    Ok(Loaded { scene, source: path.to_owned(), warnings, route: None })
+}
+
+/// A scene whose triangles stay on disk.
+fn streamed(
+    s: &SceneSettings,
+    path: &Path,
+    how: &LoadOptions,
+    options: &Options<'_>,
+) -> Result<(Scene, Vec<String>), Failure> {
+    let refused = |e: &dyn ToString| Failure::input("the scene was not loaded", e.to_string());
+    let failed = |e: std::io::Error| Failure::work("the scene cannot be kept on disk", e);
+    // Commands that keep nothing get a store for as long as they last.
+    let own = options.store.as_os_str().is_empty().then(tempfile::tempdir).transpose().map_err(failed)?;
+    let folder = own.as_ref().map_or(options.store.as_path(), |d| d.path());
+    let store = Store::open(folder, Box::new(|message| eprintln!("{message}"))).map_err(failed)?;
+    let keep = Keep { store: &store, memory_bytes: s.memory_bytes, cancel: options.cancel, say: options.say };
+    let mut made = stream::open(path, how, &keep).map_err(|e| match e {
+        LoadError::Cancelled => Failure::Cancelled,
+        e @ LoadError::Temporary { .. } => Failure::work("the scene was not loaded", e),
+        e => refused(&e),
+    })?;
+    made.builder.shift(DVec3::from(s.offset));
+    // An open file outlives its folder.
+    let scene = made.builder.build_over(Box::new(made.file)).map_err(|e| refused(&e))?;
+    Ok((scene, made.warnings))
 }
 
 fn generated(s: &SceneSettings, to_world: DAffine3) -> Result<Loaded, Failure> {
@@ -137,6 +179,18 @@ impl Parts {
     }
 }
 
+impl From<TriangleMesh> for Parts {
+    fn from(mesh: TriangleMesh) -> Self {
+        Self {
+            meshes: vec![("asteroid".into(), mesh)],
+            placements: vec![(0, DAffine3::IDENTITY)],
+            materials: vec![painted("stone")],
+            textures: vec![],
+            route: vec![],
+        }
+    }
+}
+
 impl From<ParkScene> for Parts {
     fn from(park: ParkScene) -> Self {
         Self {
@@ -177,12 +231,35 @@ impl From<PlantScene> for Parts {
 pub fn generate(kind: Generated, triangles: Option<u64>, seed: u64) -> Result<Parts, Failure> {
     let triangles = triangles.unwrap_or(kind.triangles());
     let made = match kind {
+        Generated::Asteroid => asteroid(&AsteroidSettings { triangles, seed }).map(Parts::from),
         Generated::House => house(&HouseSettings { triangles, seed }).map(Parts::from),
         Generated::Park => park(&ParkSettings { triangles, seed }).map(Parts::from),
         Generated::Pipes => pipes(&PipesSettings { triangles, seed }).map(Parts::from),
         Generated::Plant => plant(&PlantSettings { triangles, seed }).map(Parts::from),
     };
     made.map_err(|e| Failure::input("the scene was not generated", e))
+}
+
+/// Writes an asteroid as PLY without holding it; returns its triangles.
+///
+/// # Errors
+/// [`Failure::Input`] where there is none of that many triangles; what writing gives. No unfinished file is left.
+pub fn write_asteroid(file: &Path, triangles: Option<u64>, seed: u64) -> Result<u64, Failure> {
+    let settings = AsteroidSettings { triangles: triangles.unwrap_or(Generated::Asteroid.triangles()), seed };
+    let failed = |e: std::io::Error| match e.kind() {
+        std::io::ErrorKind::InvalidInput => Failure::input("the scene was not generated", e),
+        _ => Failure::work(format!("{} cannot be written", file.display()), e),
+    };
+    let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut new = tempfile::Builder::new();
+    // As any other file: the user's mask decides who may read it.
+    #[cfg(unix)]
+    new.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut out = std::io::BufWriter::new(new.tempfile_in(folder).map_err(failed)?);
+    let made = generate::asteroid::write_ply(&settings, &mut out).map_err(failed)?;
+    let whole = out.into_inner().map_err(|e| failed(e.into_error()))?;
+    whole.persist(file).map_err(|e| failed(e.error))?;
+    Ok(made)
 }
 
 /// Writes a generated scene: one node a placed mesh.

@@ -2,5 +2,6 @@
 
 mod commands;
 mod common;
+mod out_of_core;
 mod resume;
 mod sample;

@@ -2,9 +2,11 @@
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::{CutMesh, InMemory, MAX_CHUNK_TRIANGLES, Material, MeshInfo, Object, PlacedChunk, Scene, Texture, cut};
+use super::{
+    CutMesh, Geometry, InMemory, MAX_CHUNK_TRIANGLES, Material, MeshInfo, Object, PlacedChunk, Scene, Texture, cut,
+};
 use crate::id::{MeshChunkId, MeshId, ObjectId};
-use crate::mesh::TriangleMesh;
+use crate::mesh::{ChunkMesh, TriangleMesh};
 use crate::octree::Octree;
 use crate::{Aabb, Fault};
 
@@ -24,8 +26,34 @@ pub struct SceneBuilder {
     pub materials: Vec<Material>,
     /// Textures, named by index in the materials.
     pub textures: Vec<Texture>,
-    meshes: Vec<(String, CutMesh)>,
+    meshes: Vec<MeshInfo>,
+    /// The chunks of each mesh; none of those that are kept elsewhere.
+    chunks: Vec<Vec<ChunkMesh>>,
     placements: Vec<Placement>,
+}
+
+/// The digest of a mesh's chunks, which are added one after another.
+#[derive(Default)]
+pub struct ChunkDigest(blake3::Hasher);
+
+impl ChunkDigest {
+    /// Adds the next chunk. Vertex ids follow from the positions and are left out.
+    pub fn add(&mut self, c: &ChunkMesh) {
+        for part in [
+            bytemuck::cast_slice::<_, u8>(&c.positions),
+            bytemuck::cast_slice(&c.normals),
+            bytemuck::cast_slice(&c.uvs),
+            bytemuck::cast_slice(&c.colors),
+            bytemuck::cast_slice(&c.indices),
+        ] {
+            self.0.update(part);
+        }
+    }
+
+    /// Of all that was added.
+    pub fn finish(&self) -> [u8; 32] {
+        *self.0.finalize().as_bytes()
+    }
 }
 
 impl SceneBuilder {
@@ -35,8 +63,19 @@ impl SceneBuilder {
     /// [`Fault::Data`] naming the mesh, where an index, a section, an attribute's length or a position is wrong.
     pub fn mesh(&mut self, name: &str, mesh: TriangleMesh) -> Result<MeshId, Fault> {
         check(&mesh).map_err(|cause| Fault::Data { place: format!("mesh \"{name}\""), cause })?;
-        self.meshes.push((name.to_owned(), cut(mesh, MAX_CHUNK_TRIANGLES)));
+        let CutMesh { infos, chunks, vertex_ids } = cut(mesh, MAX_CHUNK_TRIANGLES);
+        let mut digest = ChunkDigest::default();
+        chunks.iter().for_each(|c| digest.add(c));
+        self.meshes.push(MeshInfo::new(name, infos, vertex_ids, digest.finish()));
+        self.chunks.push(chunks);
         Ok(MeshId(self.meshes.len() as u32 - 1))
+    }
+
+    /// Adds a mesh whose chunks are kept elsewhere: [`SceneBuilder::build_over`] gets them.
+    pub fn kept(&mut self, mesh: MeshInfo) -> MeshId {
+        self.meshes.push(mesh);
+        self.chunks.push(vec![]);
+        MeshId(self.meshes.len() as u32 - 1)
     }
 
     /// Places a mesh.
@@ -53,29 +92,27 @@ impl SceneBuilder {
     ///
     /// # Errors
     /// [`Fault::Data`] where a placement is not finite or names no mesh, or a section names no material.
-    pub fn build(self) -> Result<Scene, Fault> {
+    pub fn build(mut self) -> Result<Scene, Fault> {
+        let geometry = InMemory(std::mem::take(&mut self.chunks));
+        self.build_over(Box::new(geometry))
+    }
+
+    /// The same, with `geometry` for the way to triangles: it has the chunks of every mesh, in the order in which meshes were added.
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::build`].
+    pub fn build_over(self, geometry: Box<dyn Geometry>) -> Result<Scene, Fault> {
         let place = |i: usize| format!("object {i}");
-        let mut infos = vec![];
-        let mut geometry = vec![];
+        let infos = self.meshes;
         let mut hash = blake3::Hasher::new();
-        for (name, m) in self.meshes {
-            let bounds = m.infos.iter().fold(Aabb::EMPTY, |b, c| b.union(c.bounds));
-            let triangles = m.infos.iter().map(|c| u64::from(c.triangles)).sum();
-            if let Some(c) = m.infos.iter().find(|c| c.material.index() >= self.materials.len()) {
+        for m in &infos {
+            if let Some(c) = m.chunks.iter().find(|c| c.material.index() >= self.materials.len()) {
                 return Err(Fault::Data {
-                    place: format!("mesh \"{name}\""),
+                    place: format!("mesh \"{}\"", m.name),
                     cause: format!("material {} of {}", c.material.0, self.materials.len()),
                 });
             }
-            m.chunks.iter().for_each(|c| {
-                hash.update(bytemuck::cast_slice(&c.positions));
-                hash.update(bytemuck::cast_slice(&c.normals));
-                hash.update(bytemuck::cast_slice(&c.uvs));
-                hash.update(bytemuck::cast_slice(&c.colors));
-                hash.update(bytemuck::cast_slice(&c.indices));
-            });
-            infos.push(MeshInfo { name, bounds, triangles, vertex_ids: m.vertex_ids, chunks: m.infos });
-            geometry.push(m.chunks);
+            hash.update(&m.digest);
         }
         for m in &self.materials {
             hash.update(serde_json::to_string(m).unwrap_or_default().as_bytes());
@@ -142,7 +179,7 @@ impl SceneBuilder {
             materials: self.materials,
             textures: self.textures,
             digest: *hash.finalize().as_bytes(),
-            geometry: Box::new(InMemory(geometry)),
+            geometry,
         })
     }
 }

@@ -1,5 +1,8 @@
 //! Cutting a mesh into chunks: an octree in the mesh's own space, by the triangles' centroids, one material a chunk.
 //! O(n log n).
+//!
+//! The octree is a rule that looks at one triangle at a time ([`Cell`]), so that meshes larger than memory can be divided on
+//! disk by the same rule until a cell fits, and cut from there on ([`Cutter`]): the chunks are the same, bit for bit.
 
 use glam::Vec3;
 
@@ -40,16 +43,11 @@ pub fn cut(mut mesh: TriangleMesh, max_triangles: usize) -> CutMesh {
     let names: Vec<u32> = first.iter().map(|&f| names[f as usize]).collect();
 
     let (mut infos, mut chunks) = (vec![], vec![]);
-    let mut local = vec![u32::MAX; mesh.positions.len()];
+    let mut cutter = Cutter::new(&mesh, &names, max_triangles);
     for (range, material) in &mesh.sections {
         let triangles: Vec<u32> = (range.start / 3..range.end / 3).collect();
-        let centroid = |t: u32| -> Vec3 {
-            let at = |k| mesh.positions[mesh.indices[3 * t as usize + k] as usize] / 3.0;
-            at(0) + at(1) + at(2)
-        };
-        let bounds = Aabb::of(triangles.iter().map(|&t| centroid(t)));
-        divide(triangles, bounds, max_triangles.max(1), 0, &centroid, &mut |part| {
-            let (info, chunk) = compact(&mesh, &names, part, *material, &mut local);
+        let root = Cell::root(Aabb::of(triangles.iter().map(|&t| cutter.centroid(t))));
+        cutter.cut(root, triangles, *material, &mut |info, chunk| {
             infos.push(info);
             chunks.push(chunk);
         });
@@ -57,73 +55,124 @@ pub fn cut(mut mesh: TriangleMesh, max_triangles: usize) -> CutMesh {
     CutMesh { infos, chunks, vertex_ids }
 }
 
-/// Octree division in Morton order; the depth limit stops coincident centroids, which are then cut by number.
-fn divide(
-    triangles: Vec<u32>,
-    bounds: Aabb,
-    max: usize,
-    depth: u32,
-    centroid: &dyn Fn(u32) -> Vec3,
-    emit: &mut dyn FnMut(&[u32]),
-) {
-    if triangles.is_empty() {
-        return;
+/// What a triangle counts as in the octree.
+pub fn centroid(corners: [Vec3; 3]) -> Vec3 {
+    let [a, b, c] = corners.map(|p| p / 3.0);
+    a + b + c
+}
+
+/// A cell of the octree over centroids.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Where the centroids of its triangles are.
+    pub bounds: Aabb,
+    /// 0 for the root.
+    pub depth: u32,
+}
+
+impl Cell {
+    /// Cells this deep are not divided by place but by number: that stops coincident centroids.
+    pub const MAX_DEPTH: u32 = 24;
+
+    /// The cell of everything; `bounds` is the box of all centroids.
+    pub fn root(bounds: Aabb) -> Self {
+        Self { bounds, depth: 0 }
     }
-    if triangles.len() <= max {
-        return emit(&triangles);
+
+    /// Which of its eight children holds a centroid: x, y, z are bits 0, 1, 2.
+    pub fn octant(&self, centroid: Vec3) -> usize {
+        let (p, c) = (centroid, self.bounds.centre());
+        usize::from(p.x > c.x) | usize::from(p.y > c.y) << 1 | usize::from(p.z > c.z) << 2
     }
-    if depth == 24 {
-        return triangles.chunks(max).for_each(emit);
-    }
-    let c = bounds.centre();
-    let mut parts: [Vec<u32>; 8] = Default::default();
-    for t in triangles {
-        let p = centroid(t);
-        parts[usize::from(p.x > c.x) | usize::from(p.y > c.y) << 1 | usize::from(p.z > c.z) << 2].push(t);
-    }
-    for (i, part) in parts.into_iter().enumerate() {
-        let high = glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0);
-        let b = Aabb { min: Vec3::select(high, c, bounds.min), max: Vec3::select(high, bounds.max, c) };
-        divide(part, b, max, depth + 1, centroid, emit);
+
+    /// A child; chunks come in the order of the octants.
+    pub fn child(&self, octant: usize) -> Self {
+        let (b, c) = (self.bounds, self.bounds.centre());
+        let high = glam::BVec3::new(octant & 1 != 0, octant & 2 != 0, octant & 4 != 0);
+        let bounds = Aabb { min: Vec3::select(high, c, b.min), max: Vec3::select(high, b.max, c) };
+        Self { bounds, depth: self.depth + 1 }
     }
 }
 
-fn compact(
-    mesh: &TriangleMesh,
-    names: &[u32],
-    triangles: &[u32],
-    material: MaterialId,
-    local: &mut [u32],
-) -> (MeshChunk, ChunkMesh) {
-    let mut out = ChunkMesh::default();
-    let mut used = vec![];
-    for &t in triangles {
-        for k in 0..3 {
-            let v = mesh.indices[3 * t as usize + k] as usize;
-            if local[v] == u32::MAX {
-                local[v] = used.len() as u32;
-                used.push(v);
+/// Cuts cells of a mesh into chunks.
+pub struct Cutter<'a> {
+    mesh: &'a TriangleMesh,
+    /// Of each vertex.
+    names: &'a [u32],
+    max_triangles: usize,
+    /// Chunk-local numbers; all `u32::MAX` between chunks.
+    local: Vec<u32>,
+}
+
+impl<'a> Cutter<'a> {
+    /// For a mesh with normals; `names` are the mesh-wide names of its vertices' positions.
+    pub fn new(mesh: &'a TriangleMesh, names: &'a [u32], max_triangles: usize) -> Self {
+        Self { mesh, names, max_triangles: max_triangles.max(1), local: vec![u32::MAX; mesh.positions.len()] }
+    }
+
+    fn centroid(&self, t: u32) -> Vec3 {
+        centroid([0, 1, 2].map(|k| self.mesh.positions[self.mesh.indices[3 * t as usize + k] as usize]))
+    }
+
+    /// Gives the chunks of the cell's triangles (numbers of triangles of the mesh), in Morton order.
+    pub fn cut(
+        &mut self,
+        cell: Cell,
+        triangles: Vec<u32>,
+        material: MaterialId,
+        emit: &mut dyn FnMut(MeshChunk, ChunkMesh),
+    ) {
+        if triangles.is_empty() {
+            return;
+        }
+        if triangles.len() <= self.max_triangles || cell.depth == Cell::MAX_DEPTH {
+            for part in triangles.chunks(self.max_triangles) {
+                let (info, chunk) = self.compact(part, material);
+                emit(info, chunk);
             }
-            out.indices.push(local[v]);
+            return;
+        }
+        let mut parts: [Vec<u32>; 8] = Default::default();
+        for t in triangles {
+            parts[cell.octant(self.centroid(t))].push(t);
+        }
+        for (i, part) in parts.into_iter().enumerate() {
+            self.cut(cell.child(i), part, material, emit);
         }
     }
-    out.positions = used.iter().map(|&v| mesh.positions[v]).collect();
-    out.normals = used.iter().map(|&v| mesh.normals[v]).collect();
-    out.vertex_ids = used.iter().map(|&v| names[v]).collect();
-    if !mesh.uvs.is_empty() {
-        out.uvs = used.iter().map(|&v| mesh.uvs[v]).collect();
+
+    fn compact(&mut self, triangles: &[u32], material: MaterialId) -> (MeshChunk, ChunkMesh) {
+        let (mesh, local) = (self.mesh, &mut self.local);
+        let mut out = ChunkMesh::default();
+        let mut used = vec![];
+        for &t in triangles {
+            for k in 0..3 {
+                let v = mesh.indices[3 * t as usize + k] as usize;
+                if local[v] == u32::MAX {
+                    local[v] = used.len() as u32;
+                    used.push(v);
+                }
+                out.indices.push(local[v]);
+            }
+        }
+        out.positions = used.iter().map(|&v| mesh.positions[v]).collect();
+        out.normals = used.iter().map(|&v| mesh.normals[v]).collect();
+        out.vertex_ids = used.iter().map(|&v| self.names[v]).collect();
+        if !mesh.uvs.is_empty() {
+            out.uvs = used.iter().map(|&v| mesh.uvs[v]).collect();
+        }
+        if !mesh.colors.is_empty() {
+            out.colors = used.iter().map(|&v| mesh.colors[v]).collect();
+        }
+        used.iter().for_each(|&v| local[v] = u32::MAX);
+        let info = MeshChunk {
+            triangles: triangles.len() as u32,
+            vertices: out.positions.len() as u32,
+            bounds: Aabb::of(out.positions.iter().copied()),
+            material,
+        };
+        (info, out)
     }
-    if !mesh.colors.is_empty() {
-        out.colors = used.iter().map(|&v| mesh.colors[v]).collect();
-    }
-    used.iter().for_each(|&v| local[v] = u32::MAX);
-    let info = MeshChunk {
-        triangles: triangles.len() as u32,
-        vertices: out.positions.len() as u32,
-        bounds: Aabb::of(out.positions.iter().copied()),
-        material,
-    };
-    (info, out)
 }
 
 #[cfg(test)]

@@ -10,9 +10,9 @@ mod cut;
 mod looks;
 mod wedges;
 
-pub use builder::{Placement, SceneBuilder};
+pub use builder::{ChunkDigest, Placement, SceneBuilder};
 pub use chunk_set::ChunkSet;
-pub use cut::{CutMesh, MAX_CHUNK_TRIANGLES, cut};
+pub use cut::{Cell, CutMesh, Cutter, MAX_CHUNK_TRIANGLES, centroid, cut};
 pub use looks::{normal_matrix, texture_at, vertex_albedo, vertex_tint};
 pub use wedges::{Gathered, Textured, Wedge, gather};
 
@@ -51,7 +51,7 @@ pub struct Scene {
 }
 
 /// A mesh without its triangles.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeshInfo {
     /// As its file or generator calls it.
     pub name: String,
@@ -63,6 +63,17 @@ pub struct MeshInfo {
     pub triangles: u64,
     /// Positions that differ, mesh-wide: every [`ChunkMesh::vertex_ids`] is below.
     pub vertex_ids: u32,
+    /// Of its chunks, as [`ChunkDigest`] makes it.
+    pub digest: [u8; 32],
+}
+
+impl MeshInfo {
+    /// Of a mesh with these chunks.
+    pub fn new(name: &str, chunks: Vec<MeshChunk>, vertex_ids: u32, digest: [u8; 32]) -> Self {
+        let bounds = chunks.iter().fold(Aabb::EMPTY, |b, c| b.union(c.bounds));
+        let triangles = chunks.iter().map(|c| u64::from(c.triangles)).sum();
+        Self { name: name.to_owned(), chunks, bounds, triangles, vertex_ids, digest }
+    }
 }
 
 /// A placed mesh.
@@ -152,6 +163,8 @@ pub enum LightKind {
 }
 
 /// The only way to triangles: a chunk's, while a call lasts. In memory, mapped, or loaded in blocks.
+///
+/// What is held may be limited, so that `f` neither reads geometry itself nor waits for others that do.
 pub trait Geometry: Send + Sync {
     /// Calls `f` once with the chunk.
     ///

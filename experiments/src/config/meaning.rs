@@ -12,8 +12,7 @@ use crate::generate::{HOUSE_EYE, PLANT_EYE, gallery_height};
 use crate::path::{PATHS, ROUTE};
 
 /// How a scene is named.
-pub(super) const SCENE_HELP: &str =
-    "source = \"house\", \"park\", \"pipes\" or \"plant\" generates a scene, path = \"model.glb\" loads one";
+pub(super) const SCENE_HELP: &str = "source = \"asteroid\", \"house\", \"park\", \"pipes\" or \"plant\" generates a scene, path = \"model.glb\" loads one";
 
 /// Checks, and makes paths absolute and the reference explicit.
 pub(super) fn check(
@@ -62,6 +61,12 @@ fn scene(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes
             let message = format!("`models` makes a park; source \"{}\" is not made of them", kind.name());
             mistakes.add(&at(root, "scene", "models"), message, "not here", None);
         }
+        if scene.get("out_of_core") == Some(&Value::Bool(true)) {
+            let message = format!("a generated {} is held in memory", kind.name());
+            let help =
+                "`farfield scene ... --out FILE.ply` writes it to a file that can be read out of core".to_owned();
+            mistakes.add(&at(root, "scene", "out_of_core"), message, "not here", Some(help));
+        }
     }
     for (key, wanted) in [("path", "file"), ("models", "folder")] {
         if let Some(path) = scene.get(key).and_then(Value::as_str).map(str::to_owned) {
@@ -88,7 +93,7 @@ fn standing(scene: &Map<String, Value>) -> Option<f64> {
     let scale = scene.get("scale").and_then(Value::as_f64)?;
     let height = match generated(scene)? {
         Generated::House => HOUSE_EYE,
-        Generated::Park => return None,
+        Generated::Asteroid | Generated::Park => return None,
         Generated::Pipes => gallery_height(scene.get("triangles").and_then(Value::as_u64)?),
         Generated::Plant => PLANT_EYE,
     };

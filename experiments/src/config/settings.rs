@@ -9,12 +9,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::generate::{HOUSE_PAPER, PARK_2M, PIPES_1M, PLANT_1M};
+use crate::generate::{ASTEROID_1M, HOUSE_PAPER, PARK_2M, PIPES_1M, PLANT_1M};
 
 /// Where a scene comes from, where it is not a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Generated {
+    /// The asteroid.
+    Asteroid,
     /// The furnished house.
     House,
     /// The statuary park.
@@ -27,11 +29,12 @@ pub enum Generated {
 
 impl Generated {
     /// Every one, in alphabetical order.
-    pub const ALL: [Self; 4] = [Self::House, Self::Park, Self::Pipes, Self::Plant];
+    pub const ALL: [Self; 5] = [Self::Asteroid, Self::House, Self::Park, Self::Pipes, Self::Plant];
 
     /// As experiment files and the command line spell it.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Asteroid => "asteroid",
             Self::House => "house",
             Self::Park => "park",
             Self::Pipes => "pipes",
@@ -39,9 +42,10 @@ impl Generated {
         }
     }
 
-    /// Triangles where nothing is said: the papers' house, 2M park and pipes, a million of a plant.
+    /// Triangles where nothing is said: the papers' house, 2M park and pipes, a million of a plant and of an asteroid.
     pub fn triangles(self) -> u64 {
         match self {
+            Self::Asteroid => ASTEROID_1M,
             Self::House => HOUSE_PAPER,
             Self::Park => PARK_2M,
             Self::Pipes => PIPES_1M,
@@ -75,8 +79,8 @@ pub struct SceneSettings {
     /// A model file (.obj, .ply, .gltf, .glb, .stl, each also as .gz) or a folder of them in one coordinate frame, relative to the
     /// experiment file.
     pub path: Option<String>,
-    /// Triangles of a generated scene, all objects together; without it 262,879 of a house, 2,017,700 of a park, 1,000,000 of pipes
-    /// and of a plant.
+    /// Triangles of a generated scene, all objects together; without it 262,879 of a house, 2,017,700 of a park, 1,000,000 of pipes,
+    /// of a plant and of an asteroid.
     #[schemars(range(min = 1))]
     pub triangles: Option<u64>,
     /// Seed of a generated scene.
@@ -93,6 +97,12 @@ pub struct SceneSettings {
     pub offset: [f64; 3],
     /// Whether surfaces are seen from behind too; without it as the file says (generated scenes: false).
     pub two_sided: Option<bool>,
+    /// Whether a model is cut into a file of the store, of which triangles are read while they are used; without it where the model's
+    /// files (counted threefold where gzipped) are larger than a fifth of `memory_bytes` and can be read piece by piece: .ply, .obj, .gltf, .glb.
+    pub out_of_core: Option<bool>,
+    /// Out of core, the most bytes of original triangles that are held at once, and about the most while a model is cut.
+    #[schemars(range(min = 16_777_216), extend("unit" = "bytes"))]
+    pub memory_bytes: u64,
 }
 
 impl Default for SceneSettings {
@@ -107,6 +117,8 @@ impl Default for SceneSettings {
             scale: 1.0,
             offset: [0.0; 3],
             two_sided: None,
+            out_of_core: None,
+            memory_bytes: 2 << 30,
         }
     }
 }

@@ -184,3 +184,13 @@ fn the_reference_is_not_built_on_demand() {
     assert!(told(text, &[])[0].starts_with("park.toml:5:9: the reference is built ahead"), "{:?}", told(text, &[]));
     assert!(read(&format!("{text}[reference]\npipeline = \"b\"\n"), &[]).is_ok());
 }
+
+#[test]
+fn scenes_out_of_core_are_files_and_have_room_for_chunks() {
+    let e = read(GOOD, &[]).unwrap();
+    assert_eq!((e.scene.out_of_core, e.scene.memory_bytes), (None, 2 << 30));
+    let all = told(GOOD, &["scene.out_of_core=true"]);
+    assert!(all.len() == 1 && all[0].contains("a generated park is held in memory"), "{all:?}");
+    let all = told(GOOD, &["scene.memory_bytes=1000"]);
+    assert!(all.len() == 1 && all[0].contains("`memory_bytes` is a whole number from 16777216 (bytes)"), "{all:?}");
+}

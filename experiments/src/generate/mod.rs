@@ -4,9 +4,10 @@
 //! that scene's triangle counts, sizes, numbers and area, at any total from 100,000 to 64 million triangles; or the same
 //! park from mesh files, fitted to the same boxes ([`fit`]). [`pipes`] is a box full of pipework, from 10,000 to 16 million.
 //! [`house`] is a furnished and textured house in its garden, from 45,000 to 4 million; [`plant`] a power plant, from 100,000 to 12.5 million; both
-//! bring a route along.
+//! bring a route along. [`mod@asteroid`] is one closed surface, from 768 triangles to a billion, for tests of models larger than memory.
 //! Everything here is a pure function of its settings: the same settings give the same bytes, whatever the number of threads.
 
+pub mod asteroid;
 mod creatures;
 mod detail;
 mod figures;
@@ -29,6 +30,7 @@ mod solid;
 #[cfg(test)]
 mod tests;
 
+pub use asteroid::{ASTEROID_1M, AsteroidSettings, LEAST_ASTEROID, MOST_ASTEROID, asteroid};
 pub use fit::{Up, fit_to_box};
 pub use house::{HOUSE_EYE, HOUSE_PAPER, HouseScene, HouseSettings, LEAST_HOUSE, MOST_HOUSE, house};
 pub use kind::{Kind, PAPER_MODELS, PaperModel};

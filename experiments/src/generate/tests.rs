@@ -340,7 +340,7 @@ pub(crate) fn walked(
     sets: &[String],
 ) -> (Vec<farfield_core::Camera>, glam::DVec3, (f32, String, glam::DVec3)) {
     let experiment = crate::config::load(file, sets, &crate::list::entries()).unwrap();
-    let loaded = crate::scene::scene(&experiment).unwrap();
+    let loaded = crate::scene::scene(&experiment, &crate::run::nothing_kept()).unwrap();
     let scene = loaded.scene;
     let views = crate::path::views(&experiment.view, &scene);
     let path = crate::path::cameras(&experiment.view, &views, &scene, loaded.route.as_ref()).unwrap();

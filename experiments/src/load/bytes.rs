@@ -1,7 +1,8 @@
 //! Reading files whole, gzip undone wherever its magic number stands, and text in whatever encoding it comes.
 
 use std::borrow::Cow;
-use std::io::Read;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
 use super::LoadError;
@@ -29,6 +30,71 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
         return Err(LoadError::data(path, "gzip stream", format!("unpacks to more than {MAX_UNPACKED_BYTES} bytes")));
     }
     Ok(out)
+}
+
+/// Bytes that are read one after another, counted.
+pub(super) struct Input<'a> {
+    from: Box<dyn BufRead + 'a>,
+    read: u64,
+    /// How many there are; not known of gzip streams.
+    total: Option<u64>,
+}
+
+impl<'a> Input<'a> {
+    /// Bytes in memory.
+    pub(super) fn held(data: &'a [u8]) -> Self {
+        Self { from: Box::new(data), read: 0, total: Some(data.len() as u64) }
+    }
+
+    /// A file, unpacked if it is gzipped.
+    pub(super) fn open(path: &Path) -> Result<Self, LoadError> {
+        let failed = |cause| LoadError::Read { file: path.to_owned(), cause };
+        if !std::fs::metadata(path).map_err(failed)?.is_file() {
+            return Err(failed(io::Error::other("it is not a plain file")));
+        }
+        let file = File::open(path).map_err(failed)?;
+        let total = file.metadata().map_err(failed)?.len();
+        let mut raw = BufReader::with_capacity(1 << 20, file);
+        if !raw.fill_buf().map_err(failed)?.starts_with(&[0x1f, 0x8b]) {
+            return Ok(Self { from: Box::new(raw), read: 0, total: Some(total) });
+        }
+        let unpacked = flate2::bufread::MultiGzDecoder::new(raw);
+        Ok(Self { from: Box::new(BufReader::with_capacity(1 << 20, unpacked)), read: 0, total: None })
+    }
+
+    /// Whether what comes next begins with these bytes.
+    pub(super) fn starts_with(&mut self, bytes: &[u8]) -> bool {
+        self.from.fill_buf().is_ok_and(|b| b.starts_with(bytes))
+    }
+
+    /// Bytes that have been read.
+    pub(super) fn position(&self) -> u64 {
+        self.read
+    }
+
+    /// Bytes that are left, where that is known.
+    pub(super) fn left(&self) -> Option<u64> {
+        self.total.map(|t| t.saturating_sub(self.read))
+    }
+}
+
+impl Read for Input<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let n = self.from.read(buffer)?;
+        self.read += n as u64;
+        Ok(n)
+    }
+}
+
+impl BufRead for Input<'_> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        self.from.fill_buf()
+    }
+
+    fn consume(&mut self, n: usize) {
+        self.read += n as u64;
+        self.from.consume(n);
+    }
 }
 
 /// Text from UTF-8 or, by its byte order mark, UTF-16. Bytes that are neither (Latin-1 names and comments) become U+FFFD.

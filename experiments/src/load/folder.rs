@@ -8,7 +8,8 @@ use farfield_core::id::MaterialId;
 use super::part::Checked;
 use super::{Counts, FORMATS, LoadError, LoadOptions, read_file, reader};
 
-pub(super) fn read(folder: &Path, options: &LoadOptions) -> Result<Checked, LoadError> {
+/// The model files of a folder, in the order of their names.
+pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, LoadError> {
     let failed = |cause| LoadError::Read { file: folder.to_owned(), cause };
     let entries = std::fs::read_dir(folder).map_err(failed)?;
     let mut files: Vec<PathBuf> = entries.map(|e| e.map(|e| e.path())).collect::<Result<_, _>>().map_err(failed)?;
@@ -17,6 +18,11 @@ pub(super) fn read(folder: &Path, options: &LoadOptions) -> Result<Checked, Load
     if files.is_empty() {
         return Err(LoadError::unsupported(folder, "this folder", format!("holds no model file: {FORMATS}")));
     }
+    Ok(files)
+}
+
+pub(super) fn read(folder: &Path, options: &LoadOptions) -> Result<Checked, LoadError> {
+    let files = files(folder)?;
     let mut all = Checked {
         meshes: vec![],
         placements: vec![],

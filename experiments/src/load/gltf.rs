@@ -5,6 +5,7 @@
 //! (applied to the coordinates) and KHR_mesh_quantization are read; a file that requires another one is refused. Samplers
 //! are not used: textures repeat. O(n).
 
+use std::fs::File;
 use std::path::Path;
 
 use farfield_core::color::byte_of_linear;
@@ -14,18 +15,116 @@ use gltf::json::material::AlphaMode;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::texture::Info;
 use gltf::json::validation::{Checked, Validate};
-use gltf::json::{Index, Node, Root};
+use gltf::json::{Accessor, Index, Node, Root};
 
-use super::gltf_accessor::{Document, uri_bytes};
+use super::gltf_accessor::{Buffer, Document, uri_bytes};
+use super::gltf_stream;
 use super::part::{Model, Part};
+use super::sink::Sink;
 use super::texture::Textures;
 use super::{LoadError, bytes};
+use crate::chunks::ReadAt;
 
 const EXTENSIONS: [&str; 4] =
     ["KHR_materials_pbrSpecularGlossiness", "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_texture_transform"];
 
 pub(super) fn read(path: &Path, data: &[u8]) -> Result<Model, LoadError> {
     let (json, bin) = if data.starts_with(b"glTF") { chunks(path, data)? } else { (data, None) };
+    let root = document(path, json)?;
+    let mut textures = Textures::default();
+    let doc = Document::new(path, &root, bin.map(|b| Buffer::Held(b.into())), false, &mut textures.beside)?;
+    let (materials, mut warnings) = materials(&doc, &mut textures);
+    let mut model = Model { materials, textures: textures.finish(), ..Model::default() };
+    let mut indices_read = 0;
+    for i in 0..root.meshes.len() {
+        let part = mesh(&doc, i, &mut warnings, &mut indices_read)?;
+        model.parts.push(part);
+    }
+    model.placements = nodes(path, &root, &mut warnings)?;
+    unused(&root, &mut warnings);
+    model.warnings = warnings;
+    Ok(model)
+}
+
+/// What a file has beside its meshes.
+pub(super) struct Beside {
+    pub(super) materials: Vec<Material>,
+    pub(super) warnings: Vec<String>,
+    /// Meshes and their transforms.
+    pub(super) placements: Vec<(usize, DAffine3)>,
+}
+
+/// Reads an unpacked file piece by piece into `sink`, a mesh a mesh of the document. `batch` items are held at a time.
+pub(super) fn stream(
+    path: &Path,
+    file: File,
+    batch: u64,
+    sink: &mut impl Sink<u32>,
+    textures: &mut Textures,
+) -> Result<Beside, LoadError> {
+    let (json, bin) = kept_chunks(path, file)?;
+    let root = document(path, &json)?;
+    let doc = Document::new(path, &root, bin, true, &mut textures.beside)?;
+    let (materials, mut warnings) = materials(&doc, textures);
+    let mut vertices = 0;
+    for (i, m) in root.meshes.iter().enumerate() {
+        sink.part(&m.name.clone().unwrap_or_else(|| format!("mesh {i}")), "triangle")?;
+        let mut triangles = 0;
+        for (k, p) in m.primitives.iter().enumerate() {
+            let place = format!("meshes[{i}].primitives[{k}]");
+            let Some(shape) = shape(&doc, p, &place, &mut warnings)? else { continue };
+            gltf_stream::primitive(&doc, &shape, &place, batch, (&mut vertices, &mut triangles), sink)?;
+        }
+    }
+    let placements = nodes(path, &root, &mut warnings)?;
+    unused(&root, &mut warnings);
+    Ok(Beside { materials, warnings, placements })
+}
+
+/// The JSON of a file, and its binary chunk where it is a GLB.
+fn kept_chunks(path: &Path, file: File) -> Result<(Vec<u8>, Option<Buffer<'static>>), LoadError> {
+    let failed = |cause| LoadError::Read { file: path.to_owned(), cause };
+    let bad = |cause: String| LoadError::data(path, "GLB chunk", cause);
+    let len = file.metadata().map_err(failed)?.len();
+    let read = |at: u64, n: u64| -> Result<Vec<u8>, LoadError> {
+        if at.checked_add(n).is_none_or(|end| end > len) {
+            return Err(bad(format!("{n} bytes at byte {at} of a file of {len}")));
+        }
+        let mut out = vec![0; n as usize];
+        file.read_at(&mut out, at).map_err(failed)?;
+        Ok(out)
+    };
+    if len < 12 || !read(0, 4)?.starts_with(b"glTF") {
+        return Ok((read(0, len)?, None));
+    }
+    let word = |b: &[u8]| u64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    let head = read(0, 12)?;
+    if (word(&head[4..]), word(&head[8..]) <= len) != (2, true) {
+        let cause = format!("version {}, {} bytes announced; the file has {len}", word(&head[4..]), word(&head[8..]));
+        return Err(LoadError::data(path, "GLB header", cause));
+    }
+    let (mut json, mut bin, mut at) = (None, None, 12);
+    while at + 8 <= len {
+        let head = read(at, 8)?;
+        let (start, n) = (at + 8, word(&head));
+        match &head[4..] {
+            b"JSON" if json.is_none() => json = Some(read(start, n)?),
+            b"BIN\0" if bin.is_none() => {
+                if start + n > len {
+                    return Err(bad(format!("{n} bytes at byte {start} of a file of {len}")));
+                }
+                bin = Some((start, n));
+            }
+            _ => {}
+        }
+        at = start + n;
+    }
+    let bin = bin.map(|(start, len)| Buffer::Kept { file, start, len });
+    json.map(|j| (j, bin)).ok_or_else(|| LoadError::data(path, "GLB", "has no JSON chunk"))
+}
+
+/// The document, valid, of version 2, and without extensions that are needed and not known.
+fn document(path: &Path, json: &[u8]) -> Result<Root, LoadError> {
     let mut root: Root = serde_json::from_slice(json)
         .map_err(|e| LoadError::data(path, format!("line {}, column {}", e.line(), e.column()), e.to_string()))?;
     if let Some(e) = root.extensions_required.iter().find(|e| !EXTENSIONS.contains(&e.as_str())) {
@@ -55,30 +154,26 @@ pub(super) fn read(path: &Path, data: &[u8]) -> Result<Model, LoadError> {
         return Err(LoadError::unsupported(path, "asset.version", cause));
     }
 
-    let doc = Document::new(path, &root, bin)?;
-    let mut model = Model::default();
-    let mut textures = Textures::default();
-    for i in 0..root.materials.len() {
-        let m = material(&doc, i, &mut textures, &mut model.warnings);
-        model.materials.push(m);
-    }
+    Ok(root)
+}
+
+/// All materials, and what is said of them.
+fn materials(doc: &Document, textures: &mut Textures) -> (Vec<Material>, Vec<String>) {
+    let (root, mut warnings) = (doc.root, vec![]);
+    let mut out: Vec<Material> = (0..root.materials.len()).map(|i| material(doc, i, textures, &mut warnings)).collect();
     if root.meshes.iter().flat_map(|m| &m.primitives).any(|p| p.material.is_none()) {
         // Section 3.7.2.2: a primitive without a material is white.
-        model.materials.push(Material { base_color: [1.0; 4], ..Default::default() });
+        out.push(Material { base_color: [1.0; 4], ..Default::default() });
     }
-    model.textures = textures.finish();
-    let mut indices_read = 0;
-    for i in 0..root.meshes.len() {
-        let part = mesh(&doc, i, &mut model.warnings, &mut indices_read)?;
-        model.parts.push(part);
-    }
-    model.placements = nodes(path, &root, &mut model.warnings)?;
+    (out, warnings)
+}
+
+fn unused(root: &Root, warnings: &mut Vec<String>) {
     for (n, what) in [(root.animations.len(), "animations"), (root.skins.len(), "skins")] {
         if n > 0 {
-            model.warnings.push(format!("{n} {what} not used: meshes stand as they are stored"));
+            warnings.push(format!("{n} {what} not used: meshes stand as they are stored"));
         }
     }
-    Ok(model)
 }
 
 /// The JSON and binary chunks of a GLB (glTF 2.0, section 4.4).
@@ -183,7 +278,7 @@ fn material(doc: &Document, i: usize, textures: &mut Textures, warnings: &mut Ve
                 textures.file(doc.path.parent().unwrap_or(Path::new("")), &super::gltf_accessor::unescaped(uri))
             }
             (Some(uri), _) => uri_bytes(doc.path, uri).and_then(|d| textures.memory(&at, &d)),
-            (None, Some(view)) => doc.view(view).map_err(|e| e.to_string()).and_then(|d| textures.memory(&at, d)),
+            (None, Some(view)) => doc.view(view).map_err(|e| e.to_string()).and_then(|d| textures.memory(&at, &d)),
             (None, None) => Err("has neither uri nor bufferView".into()),
         };
         made.map_err(|cause| warnings.push(format!("{at}: {cause}: the plain colour is taken"))).ok()
@@ -212,44 +307,20 @@ fn primitive(
     indices_read: &mut u64,
 ) -> Result<(), LoadError> {
     let bad = |cause: String| LoadError::data(doc.path, place, cause);
-    let find = |s: Semantic| p.attributes.get(&Checked::Valid(s)).copied();
-    let Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) = p.mode else {
-        warnings.push(format!("{place} holds points or lines: left out"));
-        return Ok(());
-    };
-    let Some(positions) = find(Semantic::Positions) else {
-        return Err(bad("has no POSITION".into()));
-    };
-    let positions = doc.numbers::<3>(positions, 0.0)?;
+    let Some(shape) = shape(doc, p, place, warnings)? else { return Ok(()) };
+    let mode = shape.mode;
+    let positions = doc.numbers::<3>(shape.positions, 0.0)?;
     let n = positions.len();
-    let mut indices = match p.indices {
+    let mut indices = match shape.indices {
         Some(id) => doc.indices(id)?,
         None => (0..n as u32).collect(),
     };
     if let Some(at) = indices.iter().position(|&v| v as usize >= n) {
         return Err(bad(format!("index {at} names vertex {} of {n}", indices[at])));
     }
-    if mode == Mode::Triangles && indices.len() % 3 != 0 {
-        return Err(bad(format!("{} indices are not whole triangles", indices.len())));
-    }
-    let material = p.material.map_or(doc.root.materials.len(), |m| m.value());
-    let info = p.material.and_then(|m| base(&doc.root.materials[m.value()]).1);
-    let normals = find(Semantic::Normals).map(|a| doc.numbers::<3>(a, 0.0)).transpose()?;
-    let set = info.map_or(0, |i| {
-        let moved = i.extensions.as_ref().and_then(|e| e.texture_transform.as_ref()).and_then(|t| t.tex_coord);
-        moved.unwrap_or(i.tex_coord)
-    });
-    let uvs = find(Semantic::TexCoords(set)).map(|a| doc.numbers::<2>(a, 0.0)).transpose()?;
-    let colors = find(Semantic::Colors(0)).map(|a| doc.numbers::<4>(a, 1.0)).transpose()?;
-    for (what, len) in [
-        ("NORMAL", normals.as_ref().map(Vec::len)),
-        ("TEXCOORD", uvs.as_ref().map(Vec::len)),
-        ("COLOR", colors.as_ref().map(Vec::len)),
-    ] {
-        if let Some(len) = len.filter(|&l| l != n) {
-            return Err(bad(format!("{what} has {len} items for {n} vertices")));
-        }
-    }
+    let normals = shape.normals.map(|a| doc.numbers::<3>(a, 0.0)).transpose()?;
+    let uvs = shape.uvs.map(|a| doc.numbers::<2>(a, 0.0)).transpose()?;
+    let colors = shape.colors.map(|a| doc.numbers::<4>(a, 1.0)).transpose()?;
 
     // An index takes a byte at least; accessors may be shared, but not so often that a small file fills the memory.
     let most = 16 * doc.held().max(1 << 16);
@@ -280,22 +351,19 @@ fn primitive(
         part.normals.resize(all, Vec3::ZERO);
     }
     if uvs.is_some() || !part.uvs.is_empty() {
-        let placed = placement(info);
+        let placed = placement(shape.info);
         part.uvs.resize(first as usize, Vec2::ZERO);
         part.uvs.extend(uvs.iter().flat_map(|l| used.iter().map(|&v| placed(Vec2::from(l[v])))));
         part.uvs.resize(all, Vec2::ZERO);
     }
     if colors.is_some() || !part.colors.is_empty() {
         part.colors.resize(first as usize, [255; 4]);
-        part.colors.extend(colors.iter().flat_map(|l| used.iter().map(|&v| l[v])).map(|[r, g, b, _]| {
-            let [r, g, b] = [r, g, b].map(|v| if v.is_finite() { byte_of_linear(v) } else { 255 });
-            [r, g, b, 255]
-        }));
+        part.colors.extend(colors.iter().flat_map(|l| used.iter().map(|&v| l[v])).map(|[r, g, b, _]| srgb([r, g, b])));
         part.colors.resize(all, [255; 4]);
     }
     let mut push = |t: [u32; 3]| {
         part.triangles.push(t.map(|v| first + v));
-        part.materials.push(material as u32);
+        part.materials.push(shape.material);
     };
     match mode {
         Mode::TriangleStrip => indices.windows(3).enumerate().for_each(|(k, w)| {
@@ -308,8 +376,64 @@ fn primitive(
     Ok(())
 }
 
+/// A linear vertex colour as bytes.
+pub(super) fn srgb(linear: [f32; 3]) -> [u8; 4] {
+    let [r, g, b] = linear.map(|v| if v.is_finite() { byte_of_linear(v) } else { 255 });
+    [r, g, b, 255]
+}
+
+/// What a primitive is made of.
+pub(super) struct Shape<'a> {
+    pub(super) mode: Mode,
+    pub(super) positions: Index<Accessor>,
+    pub(super) indices: Option<Index<Accessor>>,
+    pub(super) normals: Option<Index<Accessor>>,
+    pub(super) uvs: Option<Index<Accessor>>,
+    pub(super) colors: Option<Index<Accessor>>,
+    pub(super) material: u32,
+    pub(super) info: Option<&'a Info>,
+}
+
+/// The accessors of a primitive, of one length; `None` of points and lines.
+fn shape<'a>(
+    doc: &Document<'a>,
+    p: &'a Primitive,
+    place: &str,
+    warnings: &mut Vec<String>,
+) -> Result<Option<Shape<'a>>, LoadError> {
+    let bad = |cause: String| LoadError::data(doc.path, place, cause);
+    let find = |s: Semantic| p.attributes.get(&Checked::Valid(s)).copied();
+    let Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) = p.mode else {
+        warnings.push(format!("{place} holds points or lines: left out"));
+        return Ok(None);
+    };
+    let Some(positions) = find(Semantic::Positions) else {
+        return Err(bad("has no POSITION".into()));
+    };
+    let (normals, colors) = (find(Semantic::Normals), find(Semantic::Colors(0)));
+    [Some(positions), p.indices, normals, colors].into_iter().flatten().try_for_each(|id| doc.fits(id))?;
+    let n = doc.count(positions);
+    let corners = p.indices.map_or(n, |i| doc.count(i));
+    if mode == Mode::Triangles && !corners.is_multiple_of(3) {
+        return Err(bad(format!("{corners} indices are not whole triangles")));
+    }
+    let info = p.material.and_then(|m| base(&doc.root.materials[m.value()]).1);
+    let set = info.map_or(0, |i| {
+        let moved = i.extensions.as_ref().and_then(|e| e.texture_transform.as_ref()).and_then(|t| t.tex_coord);
+        moved.unwrap_or(i.tex_coord)
+    });
+    let uvs = find(Semantic::TexCoords(set));
+    for (what, id) in [("NORMAL", normals), ("TEXCOORD", uvs), ("COLOR", colors)] {
+        if let Some(len) = id.map(|i| doc.count(i)).filter(|&l| l != n) {
+            return Err(bad(format!("{what} has {len} items for {n} vertices")));
+        }
+    }
+    let material = p.material.map_or(doc.root.materials.len(), |m| m.value()) as u32;
+    Ok(Some(Shape { mode, positions, indices: p.indices, normals, uvs, colors, material, info }))
+}
+
 /// KHR_texture_transform: uv' = offset + R(rotation) (scale uv).
-fn placement(info: Option<&Info>) -> impl Fn(Vec2) -> Vec2 {
+pub(super) fn placement(info: Option<&Info>) -> impl Fn(Vec2) -> Vec2 {
     let t = info.and_then(|i| i.extensions.as_ref()).and_then(|e| e.texture_transform.as_ref());
     let (offset, scale, angle) =
         t.map_or((Vec2::ZERO, Vec2::ONE, 0.0), |t| (Vec2::from(t.offset.0), Vec2::from(t.scale.0), t.rotation.0));

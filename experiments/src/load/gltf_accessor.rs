@@ -1,11 +1,15 @@
 //! glTF buffers and accessors: every offset, stride and count is held against the bytes that are there before any is read.
+//! Buffers are in memory, or in files of which a window of items is read at a time.
 //!
 //! Follows glTF 2.0 sections 3.6 (buffers, accessors, sparse accessors) and 3.6.2.2 (integers, normalised or not: so
 //! KHR_mesh_quantization needs nothing more). O(n).
 
 use std::borrow::Cow;
 use std::cell::Cell;
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use gltf::json::accessor::{ComponentType, IndexComponentType};
@@ -13,12 +17,42 @@ use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index, Root, buffer};
 
 use super::{LoadError, bytes, mtl};
+use crate::chunks::ReadAt;
+
+/// The bytes of a buffer.
+pub(super) enum Buffer<'a> {
+    /// In memory.
+    Held(Cow<'a, [u8]>),
+    /// `len` bytes of a file, from `start` on.
+    Kept { file: File, start: u64, len: u64 },
+}
+
+impl Buffer<'_> {
+    fn len(&self) -> u64 {
+        match self {
+            Self::Held(data) => data.len() as u64,
+            Self::Kept { len, .. } => *len,
+        }
+    }
+
+    /// Bytes that are there.
+    fn bytes(&self, range: Range<u64>) -> std::io::Result<Cow<'_, [u8]>> {
+        match self {
+            Self::Held(data) => Ok(data[range.start as usize..range.end as usize].into()),
+            Self::Kept { file, start, .. } => {
+                let mut out = vec![0; (range.end - range.start) as usize];
+                file.read_at(&mut out, start + range.start)?;
+                Ok(out.into())
+            }
+        }
+    }
+}
 
 /// The document with its buffers.
 pub(super) struct Document<'a> {
     pub(super) path: &'a Path,
     pub(super) root: &'a Root,
-    buffers: Vec<Cow<'a, [u8]>>,
+    buffers: Vec<Buffer<'a>>,
     /// Items that may still be read: accessors are shared, so that a small file could ask for the same bytes for ever.
     left: Cell<u64>,
 }
@@ -27,19 +61,32 @@ pub(super) struct Document<'a> {
 const MAX_READS: u64 = 1024;
 
 impl<'a> Document<'a> {
-    /// Reads every buffer: the GLB's own, data URIs and files beside the document.
-    pub(super) fn new(path: &'a Path, root: &'a Root, bin: Option<&'a [u8]>) -> Result<Self, LoadError> {
+    /// Opens every buffer: the GLB's own, data URIs and files beside the document; these stay files where `keep` says so.
+    pub(super) fn new(
+        path: &'a Path,
+        root: &'a Root,
+        mut bin: Option<Buffer<'a>>,
+        keep: bool,
+        beside: &mut BTreeSet<PathBuf>,
+    ) -> Result<Self, LoadError> {
         let mut buffers = vec![];
         for (i, b) in root.buffers.iter().enumerate() {
             let bad = |cause: String| LoadError::data(path, format!("buffer {i}"), cause);
-            let data: Cow<[u8]> = match &b.uri {
-                Some(uri) => uri_bytes(path, uri).map_err(bad)?.into(),
-                None => match bin.filter(|_| i == 0) {
-                    Some(bin) => bin.into(),
+            let data = match &b.uri {
+                Some(uri) => {
+                    let file = uri_file(path, uri);
+                    beside.extend(file.clone());
+                    match file.filter(|_| keep).map(|f| kept(&f)).transpose()?.flatten() {
+                        Some(kept) => kept,
+                        None => Buffer::Held(uri_bytes(path, uri).map_err(bad)?.into()),
+                    }
+                }
+                None => match bin.take_if(|_| i == 0) {
+                    Some(bin) => bin,
                     None => return Err(bad("has neither a uri nor a binary chunk".into())),
                 },
             };
-            if (data.len() as u64) < b.byte_length.0 {
+            if data.len() < b.byte_length.0 {
                 return Err(bad(format!("has {} bytes, {} were announced", data.len(), b.byte_length.0)));
             }
             buffers.push(data);
@@ -52,41 +99,86 @@ impl<'a> Document<'a> {
 
     /// The bytes of all buffers.
     pub(super) fn held(&self) -> u64 {
-        self.buffers.iter().map(|b| b.len() as u64).sum()
+        self.buffers.iter().map(Buffer::len).sum()
     }
 
     /// The bytes of a buffer view.
-    pub(super) fn view(&self, id: Index<buffer::View>) -> Result<&[u8], LoadError> {
+    pub(super) fn view(&self, id: Index<buffer::View>) -> Result<Cow<'_, [u8]>, LoadError> {
+        let (buffer, range) = self.place(id)?;
+        self.bytes(buffer, range)
+    }
+
+    fn bytes(&self, buffer: usize, range: Range<u64>) -> Result<Cow<'_, [u8]>, LoadError> {
+        let failed = |cause| LoadError::Read { file: self.path.to_owned(), cause };
+        self.buffers[buffer].bytes(range).map_err(failed)
+    }
+
+    /// Which bytes of which buffer a view is: they are there.
+    fn place(&self, id: Index<buffer::View>) -> Result<(usize, Range<u64>), LoadError> {
         let v = &self.root.buffer_views[id.value()];
-        let data = &self.buffers[v.buffer.value()];
+        let len = self.buffers[v.buffer.value()].len();
         let start = v.byte_offset.unwrap_or_default().0;
-        let range = start.checked_add(v.byte_length.0).map(|end| start as usize..end as usize);
-        range.and_then(|r| data.get(r)).ok_or_else(|| {
-            let cause = format!("{} bytes at {start} of a buffer of {}", v.byte_length.0, data.len());
+        let end = start.checked_add(v.byte_length.0).filter(|&end| end <= len);
+        end.map(|end| (v.buffer.value(), start..end)).ok_or_else(|| {
+            let cause = format!("{} bytes at {start} of a buffer of {len}", v.byte_length.0);
             LoadError::data(self.path, format!("bufferView {}", id.value()), cause)
         })
     }
 
-    /// `count` items of `size` bytes each, `stride` apart, from byte `offset` of a view.
-    fn items(&self, id: Index<buffer::View>, offset: u64, size: usize, count: u64) -> Result<Items<'_>, LoadError> {
-        let view = self.view(id)?;
+    /// Those in `window` of `count` items of `size` bytes each, `stride` apart, from byte `offset` of a view.
+    fn items(
+        &self,
+        id: Index<buffer::View>,
+        offset: u64,
+        size: usize,
+        count: u64,
+        window: Range<u64>,
+    ) -> Result<Items<'_>, LoadError> {
+        let (buffer, view) = self.place(id)?;
+        let len = view.end - view.start;
         let stride = self.root.buffer_views[id.value()].byte_stride.map_or(size, |s| s.0);
         // The last item needs `size` bytes only.
         let end = count.saturating_sub(1).checked_mul(stride as u64).and_then(|n| n.checked_add(size as u64));
         let end = end.and_then(|n| n.checked_add(offset));
-        if stride < size || count > 0 && end.is_none_or(|n| n > view.len() as u64) {
+        if stride < size || count > 0 && end.is_none_or(|n| n > len) {
             let cause = format!(
-                "{count} items of {size} bytes, {stride} apart, from byte {offset} on do not fit in {} bytes",
-                view.len()
+                "{count} items of {size} bytes, {stride} apart, from byte {offset} on do not fit in {len} bytes"
             );
             return Err(LoadError::data(self.path, format!("bufferView {}", id.value()), cause));
         }
-        Ok(Items { data: &view[offset.min(view.len() as u64) as usize..], size, stride, count: count as usize })
+        let (window, stride) = (window.start..window.end.min(count), stride as u64);
+        let count = window.end.saturating_sub(window.start);
+        if count == 0 {
+            return Ok(Items { data: Cow::Borrowed(&[]), size, stride: stride as usize, count: 0 });
+        }
+        let first = view.start + offset + window.start * stride;
+        let data = self.bytes(buffer, first..first + (count - 1) * stride + size as u64)?;
+        Ok(Items { data, size, stride: stride as usize, count: count as usize })
+    }
+
+    /// Whether an accessor's items are there.
+    pub(super) fn fits(&self, id: Index<Accessor>) -> Result<(), LoadError> {
+        self.raw(id, 0..0).map(drop)
+    }
+
+    /// How many items an accessor has.
+    pub(super) fn count(&self, id: Index<Accessor>) -> u64 {
+        self.root.accessors[id.value()].count.0
     }
 
     /// An accessor as numbers, `N` an item; fewer components than `N` leave the rest at `fill`.
     pub(super) fn numbers<const N: usize>(&self, id: Index<Accessor>, fill: f32) -> Result<Vec<[f32; N]>, LoadError> {
-        let raw = self.raw(id)?;
+        self.some_numbers(id, fill, 0..self.count(id))
+    }
+
+    /// Those of its items that are in `window`.
+    pub(super) fn some_numbers<const N: usize>(
+        &self,
+        id: Index<Accessor>,
+        fill: f32,
+        window: Range<u64>,
+    ) -> Result<Vec<[f32; N]>, LoadError> {
+        let raw = self.raw(id, window)?;
         let normalized = self.root.accessors[id.value()].normalized;
         Ok(raw
             .values
@@ -103,7 +195,12 @@ impl<'a> Document<'a> {
 
     /// An accessor as indices.
     pub(super) fn indices(&self, id: Index<Accessor>) -> Result<Vec<u32>, LoadError> {
-        let raw = self.raw(id)?;
+        self.some_indices(id, 0..self.count(id))
+    }
+
+    /// Those of its items that are in `window`.
+    pub(super) fn some_indices(&self, id: Index<Accessor>, window: Range<u64>) -> Result<Vec<u32>, LoadError> {
+        let raw = self.raw(id, window)?;
         if !matches!(raw.kind.0, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) || raw.components != 1 {
             let cause = "indices are not unsigned scalars";
             return Err(LoadError::data(self.path, format!("accessor {}", id.value()), cause));
@@ -112,7 +209,7 @@ impl<'a> Document<'a> {
         Ok(raw.values.into_iter().map(|v| v as u32).collect())
     }
 
-    fn raw(&self, id: Index<Accessor>) -> Result<Raw, LoadError> {
+    fn raw(&self, id: Index<Accessor>, window: Range<u64>) -> Result<Raw, LoadError> {
         let a = &self.root.accessors[id.value()];
         let bad = |cause: &str| LoadError::data(self.path, format!("accessor {}", id.value()), cause);
         let (Checked::Valid(kind), Checked::Valid(shape)) = (a.component_type, a.type_) else {
@@ -122,8 +219,9 @@ impl<'a> Document<'a> {
         let size = kind.0.size() * components;
         let mut values = match a.buffer_view {
             Some(view) => {
-                let items = self.items(view, a.byte_offset.unwrap_or_default().0, size, a.count.0)?;
-                let left = self.left.get().checked_sub(a.count.0);
+                let offset = a.byte_offset.unwrap_or_default().0;
+                let items = self.items(view, offset, size, a.count.0, window.clone())?;
+                let left = self.left.get().checked_sub(items.count as u64);
                 self.left.set(left.ok_or_else(|| bad("is read when every byte has been read 1,024 times over"))?);
                 kind.read(&items)
             }
@@ -133,24 +231,25 @@ impl<'a> Document<'a> {
                 if a.count.0 < sparse.count.0 || a.count.0 > self.held().max(1 << 16) {
                     return Err(bad("claims more items than the file has bytes"));
                 }
-                vec![0.0; a.count.0 as usize * components]
+                vec![0.0; (window.end - window.start) as usize * components]
             }
         };
         if let Some(s) = &a.sparse {
             let Checked::Valid(IndexComponentType(index)) = s.indices.component_type else {
                 return Err(bad("its sparse indices have no valid type"));
             };
-            let at = Kind(index).read(&self.items(
-                s.indices.buffer_view,
-                s.indices.byte_offset.0,
-                index.size(),
-                s.count.0,
-            )?);
-            let new = kind.read(&self.items(s.values.buffer_view, s.values.byte_offset.0, size, s.count.0)?);
+            let (n, i, v) = (s.count.0, &s.indices, &s.values);
+            let at = Kind(index).read(&self.items(i.buffer_view, i.byte_offset.0, index.size(), n, 0..n)?);
+            let new = kind.read(&self.items(v.buffer_view, v.byte_offset.0, size, n, 0..n)?);
             for (i, new) in at.into_iter().zip(new.chunks_exact(components)) {
-                let first = i as usize * components;
-                let old = values.get_mut(first..first + components);
-                old.ok_or_else(|| bad("its sparse indices leave it"))?.copy_from_slice(new);
+                let i = i as u64;
+                if i >= a.count.0 {
+                    return Err(bad("its sparse indices leave it"));
+                }
+                if window.contains(&i) {
+                    let first = (i - window.start) as usize * components;
+                    values[first..first + components].copy_from_slice(new);
+                }
             }
         }
         Ok(Raw { values, components, kind })
@@ -159,7 +258,7 @@ impl<'a> Document<'a> {
 
 /// Items of one size at equal distances, all inside `data`.
 struct Items<'a> {
-    data: &'a [u8],
+    data: Cow<'a, [u8]>,
     size: usize,
     stride: usize,
     count: usize,
@@ -204,6 +303,22 @@ impl Kind {
         };
         v as f32
     }
+}
+
+/// The file behind a URI, where it is one.
+fn uri_file(path: &Path, uri: &str) -> Option<PathBuf> {
+    let file = !uri.starts_with("data:") && !uri.contains("://");
+    file.then(|| mtl::resolve(path.parent().unwrap_or(Path::new("")), &unescaped(uri)))
+}
+
+/// A file as a buffer; `None` where it has to be unpacked, or is none.
+fn kept(path: &Path) -> Result<Option<Buffer<'static>>, LoadError> {
+    let failed = |cause| LoadError::Read { file: path.to_owned(), cause };
+    let Ok(file) = File::open(path) else { return Ok(None) };
+    let meta = file.metadata().map_err(failed)?;
+    let mut magic = [0; 2];
+    let plain = meta.is_file() && meta.len() > 2 && file.read_at(&mut magic, 0).is_ok() && magic != [0x1f, 0x8b];
+    Ok(plain.then(|| Buffer::Kept { file, start: 0, len: meta.len() }))
 }
 
 /// The bytes behind a URI: `data:...;base64,...`, or a file beside the document.

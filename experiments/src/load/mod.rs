@@ -8,7 +8,7 @@
 //! is taken as sRGB, and a texture replaces it, since most exporters write the texture's mean or a preview there; glTF
 //! factors are linear. Texture coordinates of OBJ and PLY are flipped to a top-left origin. Normals that a file does not
 //! give stay empty and are made by the core; where it gives some, the others are made smooth here. STL facets are welded
-//! and their normals dropped. Alpha, metalness, skins, morphs and animations are not used. Limits: 32-bit indices, gzip
+//! and their normals dropped. Models larger than memory are read piece by piece ([`stream`]). Alpha, metalness, skins, morphs and animations are not used. Limits: 32-bit indices, gzip
 //! streams of at most 2 GiB.
 
 mod bytes;
@@ -16,12 +16,15 @@ mod error;
 mod folder;
 mod gltf;
 mod gltf_accessor;
+mod gltf_stream;
 mod mtl;
 mod obj;
 mod part;
 mod ply;
 mod polygon;
+mod sink;
 mod stl;
+pub mod stream;
 mod texture;
 
 use std::path::Path;

@@ -22,6 +22,7 @@ pub(super) fn read_library(
         if whole.is_file() { vec![whole] } else { names.split_whitespace().map(|n| resolve(folder, n)).collect() };
     let mut out = vec![];
     for file in files {
+        textures.beside.insert(file.clone());
         match bytes::read(&file) {
             Ok(data) => out.extend(read(&file, &bytes::text(&data), textures, warnings)),
             Err(e) => warnings.push(format!("material library {e}")),

@@ -142,11 +142,7 @@ impl Model {
             counts.degenerate_triangles += p.sift(file)?;
         }
         if self.parts.iter().all(|p| p.triangles.is_empty()) {
-            let cause = match counts.degenerate_triangles {
-                0 => "holds no triangles".to_owned(),
-                n => format!("all {n} triangles have no area"),
-            };
-            return Err(LoadError::data(file, "the whole file", cause));
+            return Err(no_triangles(file, counts.degenerate_triangles as u64));
         }
         let origin = self.extent(file)?;
         counts.duplicate_triangles = self.duplicates();
@@ -182,37 +178,17 @@ impl Model {
         Ok(Checked { meshes, placements, materials, textures: self.textures, warnings: self.warnings, counts })
     }
 
-    /// Refuses extents that 32-bit floats cannot measure; returns the origin that keeps coordinates precise: zero, or, for
-    /// a flat file that stands further than 64 of its diagonals away, its middle.
     fn extent(&self, file: &Path) -> Result<DVec3, LoadError> {
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for p in &self.parts {
+        let mut boxes = vec![];
+        for p in self.parts.iter().filter(|p| !p.triangles.is_empty()) {
             let (mut l, mut h) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
             for &v in p.triangles.iter().flatten() {
                 let x = p.positions[v as usize];
                 (l, h) = (l.min(x), h.max(x));
             }
-            if p.triangles.is_empty() {
-                continue;
-            }
-            let diagonal2 = (h - l).as_vec3().length_squared();
-            if !(diagonal2.is_finite() && l.as_vec3().is_finite() && h.as_vec3().is_finite()) {
-                let place = format!("\"{}\"", p.name);
-                let cause =
-                    format!("its box {l:?} .. {h:?} is too large: the square of its diagonal overflows 32-bit floats");
-                return Err(LoadError::data(file, place, cause));
-            }
-            if diagonal2 < f32::MIN_POSITIVE {
-                let place = format!("\"{}\"", p.name);
-                let cause =
-                    format!("its box {l:?} .. {h:?} is too small: the square of its diagonal underflows 32-bit floats");
-                return Err(LoadError::data(file, place, cause));
-            }
-            (low, high) = (low.min(l), high.max(h));
+            boxes.push((p.name.as_str(), l, h));
         }
-        let middle = (low + high) * 0.5;
-        let far = self.flat && middle.length() > 64.0 * (high - low).length();
-        Ok(if far { middle } else { DVec3::ZERO })
+        origin(file, &boxes, self.flat)
     }
 
     /// Triangles whose three positions another one before them has too.
@@ -235,4 +211,37 @@ impl Model {
         };
         if self.flat { space(&self.parts) } else { self.parts.iter().map(|p| space(std::slice::from_ref(p))).sum() }
     }
+}
+
+/// Refuses a file without triangles.
+pub(super) fn no_triangles(file: &Path, degenerate: u64) -> LoadError {
+    let cause = match degenerate {
+        0 => "holds no triangles".to_owned(),
+        n => format!("all {n} triangles have no area"),
+    };
+    LoadError::data(file, "the whole file", cause)
+}
+
+/// Refuses extents that 32-bit floats cannot measure, by the names and boxes of meshes with triangles; returns the origin that
+/// keeps coordinates precise: zero, or, for a flat file that stands further than 64 of its diagonals away, its middle.
+pub(super) fn origin(file: &Path, boxes: &[(&str, DVec3, DVec3)], flat: bool) -> Result<DVec3, LoadError> {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for &(name, l, h) in boxes {
+        let diagonal2 = (h - l).as_vec3().length_squared();
+        let refused = |what: &str, flows: &str| {
+            let cause =
+                format!("its box {l:?} .. {h:?} is too {what}: the square of its diagonal {flows} 32-bit floats");
+            LoadError::data(file, format!("\"{name}\""), cause)
+        };
+        if !(diagonal2.is_finite() && l.as_vec3().is_finite() && h.as_vec3().is_finite()) {
+            return Err(refused("large", "overflows"));
+        }
+        if diagonal2 < f32::MIN_POSITIVE {
+            return Err(refused("small", "underflows"));
+        }
+        (low, high) = (low.min(l), high.max(h));
+    }
+    let middle = (low + high) * 0.5;
+    let far = flat && middle.length() > 64.0 * (high - low).length();
+    Ok(if far { middle } else { DVec3::ZERO })
 }

@@ -5,16 +5,19 @@
 //! 0..1) alone or with the prefix `diffuse_`, and s t, u v or texture_u texture_v. Parsed element by element with
 //! ply-rs-bw, after the header's counts have been held against the file's size. O(n).
 
-use std::io::{BufRead, Cursor};
+use std::io::BufRead;
 use std::path::Path;
 
+use farfield_core::scene::Material;
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType};
 
+use super::bytes::Input;
 use super::part::{Model, Part};
+use super::sink::Sink;
 use super::texture::Textures;
-use super::{LoadError, bytes, plain, polygon};
+use super::{LoadError, bytes, plain};
 
 #[derive(Default)]
 struct Vertex {
@@ -101,20 +104,18 @@ fn scalar(p: &Property) -> Option<f64> {
     })
 }
 
-/// The payload: where the cursor stands in it.
-struct Body<'a> {
+/// The payload.
+struct Body<'a, 'd> {
     path: &'a Path,
     encoding: Encoding,
-    data: Cursor<&'a [u8]>,
+    data: Input<'d>,
+    /// Where it starts.
+    start: u64,
     line: usize,
 }
 
-impl Body<'_> {
-    fn left(&self) -> u64 {
-        self.data.get_ref().len() as u64 - self.data.position()
-    }
-
-    /// Refuses a count that the rest of the file cannot hold.
+impl Body<'_, '_> {
+    /// Refuses a count that the rest of the file cannot hold, where that is known.
     fn claim(&self, def: &ElementDef) -> Result<(), LoadError> {
         let least: u64 = match self.encoding {
             Encoding::Ascii => (2 * def.properties.len() as u64).max(1),
@@ -126,16 +127,21 @@ impl Body<'_> {
                 })
                 .sum(),
         };
+        let Some(left) = self.data.left() else { return Ok(()) };
         // The last line of an ascii file may lack its line break.
-        let room = self.left() + u64::from(self.encoding == Encoding::Ascii);
+        let room = left + u64::from(self.encoding == Encoding::Ascii);
         if (def.count as u64).checked_mul(least).is_none_or(|n| n > room) {
-            let cause = format!("claims {} of at least {least} bytes each; {} bytes are left", def.count, self.left());
+            let cause = format!("claims {} of at least {least} bytes each; {left} bytes are left", def.count);
             return Err(LoadError::data(self.path, format!("header, element {}", def.name), cause));
         }
         Ok(())
     }
 
-    fn each<E: PropertyAccess>(&mut self, def: &ElementDef, mut f: impl FnMut(usize, E)) -> Result<(), LoadError> {
+    fn each<E: PropertyAccess>(
+        &mut self,
+        def: &ElementDef,
+        mut f: impl FnMut(usize, E) -> Result<(), LoadError>,
+    ) -> Result<(), LoadError> {
         self.claim(def)?;
         if def.properties.is_empty() && self.encoding != Encoding::Ascii {
             return Ok(());
@@ -143,7 +149,7 @@ impl Body<'_> {
         let parser = Parser::<E>::new();
         let mut line = vec![];
         for i in 0..def.count {
-            let at = self.data.position();
+            let at = self.data.position() - self.start;
             let read = match self.encoding {
                 Encoding::Ascii => {
                     line.clear();
@@ -169,7 +175,7 @@ impl Body<'_> {
                     };
                     LoadError::data(self.path, place, said(&e))
                 })?,
-            );
+            )?;
         }
         Ok(())
     }
@@ -190,80 +196,9 @@ fn said(e: &ParseError) -> String {
 }
 
 pub(super) fn read(path: &Path, data: &[u8]) -> Result<Model, LoadError> {
-    if data.is_empty() {
-        return Err(LoadError::data(path, "header", "the file is empty"));
-    }
-    let mut reader = Reader::new(Cursor::new(data));
-    let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(|e| {
-        let place = e.line().map_or("header".into(), |l| format!("line {l}"));
-        LoadError::data(path, place, said(&e))
-    })?;
-    let line = reader.line().saturating_sub(1);
-    let mut body = Body { path, encoding: header.encoding, data: Cursor::new(&[]), line };
-    let start = reader.into_inner().position() as usize;
-    body.data = Cursor::new(&data[start..]);
-
-    let mut part = Part { name: "ply".into(), place: "face", ..Default::default() };
-    let mut split = vec![];
-    let mut bad = None;
-    for (_, def) in &header.elements {
-        let has = |names: &[&str]| names.iter().all(|n| def.properties.contains_key(*n));
-        match def.name.as_str() {
-            "vertex" => {
-                if !has(&["x", "y", "z"]) {
-                    return Err(LoadError::data(path, "header, element vertex", "has no properties x, y and z"));
-                }
-                let normals = has(&["nx", "ny", "nz"]);
-                let uvs = has(&["s", "t"]) || has(&["u", "v"]) || has(&["texture_u", "texture_v"]);
-                let colors = has(&["red", "green", "blue"]) || has(&["diffuse_red", "diffuse_green", "diffuse_blue"]);
-                body.each(def, |_, v: Vertex| {
-                    part.positions.push(DVec3::from(v.position));
-                    if normals {
-                        part.normals.push(Vec3::from(v.normal));
-                    }
-                    if uvs {
-                        part.uvs.push(Vec2::new(v.uv[0], 1.0 - v.uv[1]));
-                    }
-                    if colors {
-                        let [r, g, b] = v.color;
-                        part.colors.push([r, g, b, 255]);
-                    }
-                })?;
-            }
-            "face" => body.each(def, |i, f: Face| {
-                if let Err(cause) = polygon(&mut part, &mut split, i, &f.0) {
-                    bad.get_or_insert((format!("face {i}"), cause));
-                }
-            })?,
-            "tristrips" => body.each(def, |i, f: Face| {
-                if let Err(cause) = strip(&mut part, i, &f.0) {
-                    bad.get_or_insert((format!("tristrips {i}"), cause));
-                }
-            })?,
-            _ => body.each(def, |_, _: Skipped| ())?,
-        }
-    }
-    if let Some((place, cause)) = bad {
-        return Err(LoadError::data(path, place, cause));
-    }
-    part.materials = vec![0; part.triangles.len()];
-    let mut warnings = vec![];
+    let mut part = Part::default();
     let mut textures = Textures::default();
-    let mut material = plain("default");
-    if let Some(name) = header.comments.iter().find_map(|c| c.trim().strip_prefix("TextureFile "))
-        && !part.uvs.is_empty()
-    {
-        match textures.file(path.parent().unwrap_or(Path::new("")), name.trim()) {
-            Ok(id) => {
-                material.texture = Some(id);
-                material.base_color = [1.0; 4];
-            }
-            Err(cause) => warnings.push(format!("{cause}: the plain colour is taken")),
-        }
-    }
-    if !part.colors.is_empty() {
-        material.base_color = [1.0; 4];
-    }
+    let (material, warnings) = parse(path, Input::held(data), &mut part, &mut textures)?;
     Ok(Model {
         parts: vec![part],
         placements: vec![(0, DAffine3::IDENTITY)],
@@ -274,41 +209,104 @@ pub(super) fn read(path: &Path, data: &[u8]) -> Result<Model, LoadError> {
     })
 }
 
-fn vertex(part: &Part, i: i64) -> Result<u32, String> {
-    let n = part.positions.len();
-    match usize::try_from(i) {
-        Ok(v) if v < n => Ok(v as u32),
-        _ => Err(format!("names vertex {i}; {n} are listed before it (counted from 0)")),
+/// Reads a file piece by piece into `sink`, as one mesh; returns its material and what was left out.
+pub(super) fn parse(
+    path: &Path,
+    mut data: Input<'_>,
+    sink: &mut impl Sink<u32>,
+    textures: &mut Textures,
+) -> Result<(Material, Vec<String>), LoadError> {
+    if data.fill_buf().is_ok_and(<[u8]>::is_empty) {
+        return Err(LoadError::data(path, "header", "the file is empty"));
     }
-}
+    let mut reader = Reader::new(data);
+    let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(|e| {
+        let place = e.line().map_or("header".into(), |l| format!("line {l}"));
+        LoadError::data(path, place, said(&e))
+    })?;
+    let line = reader.line().saturating_sub(1);
+    let data = reader.into_inner();
+    let mut body = Body { path, encoding: header.encoding, start: data.position(), data, line };
 
-fn polygon(part: &mut Part, split: &mut Vec<[u32; 3]>, face: usize, list: &[i64]) -> Result<(), String> {
-    let ids = list.iter().map(|&i| vertex(part, i)).collect::<Result<Vec<u32>, String>>()?;
-    if ids.len() < 3 {
-        return Err(format!("a face of {} corners", ids.len()));
-    }
-    let points: Vec<DVec3> = ids.iter().map(|&v| part.positions[v as usize]).collect();
-    split.clear();
-    polygon::triangulate(&points, split);
-    for t in split {
-        part.triangles.push(t.map(|k| ids[k as usize]));
-        part.places.push(face as u32);
-    }
-    Ok(())
-}
-
-/// Triangles (a, b, c), (c, b, d), (c, d, e), ...: every second one is turned, and -1 starts anew.
-fn strip(part: &mut Part, number: usize, list: &[i64]) -> Result<(), String> {
-    for run in list.split(|&i| i == -1) {
-        for (k, w) in run.windows(3).enumerate() {
-            let w = if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] };
-            let mut t = [0; 3];
-            for (id, i) in t.iter_mut().zip(w) {
-                *id = vertex(part, i)?;
+    sink.part("ply", "face")?;
+    let (mut vertices, mut any_uvs, mut any_colors) = (0, false, false);
+    for (_, def) in &header.elements {
+        let has = |names: &[&str]| names.iter().all(|n| def.properties.contains_key(*n));
+        match def.name.as_str() {
+            "vertex" => {
+                if !has(&["x", "y", "z"]) {
+                    return Err(LoadError::data(path, "header, element vertex", "has no properties x, y and z"));
+                }
+                if vertices > 0 {
+                    return Err(LoadError::data(path, "header, element vertex", "stands there twice"));
+                }
+                let normals = has(&["nx", "ny", "nz"]);
+                let uvs = has(&["s", "t"]) || has(&["u", "v"]) || has(&["texture_u", "texture_v"]);
+                let colors = has(&["red", "green", "blue"]) || has(&["diffuse_red", "diffuse_green", "diffuse_blue"]);
+                (any_uvs, any_colors) = (any_uvs || uvs && def.count > 0, any_colors || colors && def.count > 0);
+                body.each(def, |_, v: Vertex| {
+                    vertices += 1;
+                    sink.position(DVec3::from(v.position))?;
+                    if normals {
+                        sink.normal(Some(Vec3::from(v.normal)))?;
+                    }
+                    if uvs {
+                        sink.uv(Some(Vec2::new(v.uv[0], 1.0 - v.uv[1])))?;
+                    }
+                    if colors {
+                        let [r, g, b] = v.color;
+                        sink.color(Some([r, g, b, 255]))?;
+                    }
+                    Ok(())
+                })?;
             }
-            part.triangles.push(t);
-            part.places.push(number as u32);
+            "face" => body.each(def, |i, f: Face| {
+                let bad = |cause| LoadError::data(path, format!("face {i}"), cause);
+                let corners = named(&f.0, vertices).map_err(bad)?;
+                if corners.len() < 3 {
+                    return Err(bad(format!("a face of {} corners", corners.len())));
+                }
+                sink.face(&corners, 0, i as u32)
+            })?,
+            "tristrips" => body.each(def, |i, f: Face| {
+                let bad = |cause| LoadError::data(path, format!("tristrips {i}"), cause);
+                for run in f.0.split(|&v| v == -1) {
+                    let corners = named(run, vertices).map_err(bad)?;
+                    // Triangles (a, b, c), (c, b, d), (c, d, e), ...: every second one is turned, and -1 starts anew.
+                    for (k, w) in corners.windows(3).enumerate() {
+                        let w = if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] };
+                        sink.face(&w, 0, i as u32)?;
+                    }
+                }
+                Ok(())
+            })?,
+            _ => body.each(def, |_, _: Skipped| Ok(()))?,
         }
     }
-    Ok(())
+    let mut warnings = vec![];
+    let mut material = plain("default");
+    if let Some(name) = header.comments.iter().find_map(|c| c.trim().strip_prefix("TextureFile "))
+        && any_uvs
+    {
+        match textures.file(path.parent().unwrap_or(Path::new("")), name.trim()) {
+            Ok(id) => {
+                material.texture = Some(id);
+                material.base_color = [1.0; 4];
+            }
+            Err(cause) => warnings.push(format!("{cause}: the plain colour is taken")),
+        }
+    }
+    if any_colors {
+        material.base_color = [1.0; 4];
+    }
+    Ok((material, warnings))
+}
+
+/// The vertices that a list names.
+fn named(list: &[i64], vertices: u64) -> Result<Vec<u32>, String> {
+    let vertex = |&i: &i64| match u32::try_from(i) {
+        Ok(v) if u64::from(v) < vertices => Ok(v),
+        _ => Err(format!("names vertex {i}; {vertices} are listed before it (counted from 0)")),
+    };
+    list.iter().map(vertex).collect()
 }

@@ -1,6 +1,6 @@
 //! Textures: decoded once each, to sRGB bytes, through `image` (png, jpeg, tga, bmp).
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
@@ -17,6 +17,8 @@ const MAX_SIDE_PX: u32 = 16_384;
 pub(super) struct Textures {
     list: Vec<Texture>,
     known: HashMap<PathBuf, Result<TextureId, String>>,
+    /// Files beside the model that were read or looked for, material libraries and buffers too.
+    pub(super) beside: BTreeSet<PathBuf>,
 }
 
 impl Textures {
@@ -29,6 +31,7 @@ impl Textures {
         if let Some(known) = self.known.get(&path) {
             return known.clone();
         }
+        self.beside.insert(path.clone());
         let made = bytes::read(&path)
             .map_err(|e| format!("texture {e}"))
             .and_then(|data| self.picture(name, Some(&path), &data));

@@ -59,6 +59,11 @@ impl Store {
         &self.root
     }
 
+    /// Where unfinished files are; they begin with the number of the process.
+    pub(crate) fn aside(&self) -> PathBuf {
+        self.root.join("aside")
+    }
+
     fn file(&self, key: &Key) -> PathBuf {
         let name = key.iter().map(|b| format!("{b:02x}")).collect::<String>();
         self.root.join("blocks").join(&name[..2]).join(&name[2..])

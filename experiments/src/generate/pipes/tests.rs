@@ -217,7 +217,7 @@ fn a_tour_leads_through_the_middle_of_the_pipes() {
     for (triangles, seed) in [(LEAST_PIPES, 1), (100_000, 1), (PIPES_1M, 1), (PIPES_1M, 2), (4_000_000, 3)] {
         let sets = [format!("scene.triangles={triangles}"), format!("scene.seed={seed}")];
         let experiment = crate::config::load(file, &sets, &crate::list::entries()).unwrap();
-        let scene = crate::scene::scene(&experiment).unwrap().scene;
+        let scene = crate::scene::scene(&experiment, &crate::run::nothing_kept()).unwrap().scene;
         let views = crate::path::views(&experiment.view, &scene);
         let path = crate::path::cameras(&experiment.view, &views, &scene, None).unwrap();
         let (low, high) = (scene.bounds.min.y, scene.bounds.max.y);

@@ -1,0 +1,193 @@
+//! A cache with a hard limit on its bytes: least recently used first out, safe for many threads.
+//!
+//! What is in use is pinned and stays; what is being read counts in full before the first byte is read. So the sum of what is
+//! held and what is on its way never exceeds the limit. Where everything held is in use, a reader waits until some of it is
+//! free; a thread that itself holds a value does not wait, since it might wait for itself: it is told that the limit is too
+//! small. O(log values) a use.
+
+use std::cell::Cell;
+use std::collections::{BTreeMap, HashMap};
+use std::ops::Deref;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+thread_local! {
+    /// Values that this thread holds, of any cache.
+    static HELD: Cell<usize> = const { Cell::new(0) };
+}
+
+/// Values by number.
+pub struct Cache<V> {
+    limit_bytes: u64,
+    state: Mutex<State<V>>,
+    changed: Condvar,
+}
+
+struct State<V> {
+    /// Held and on the way.
+    bytes: u64,
+    peak_bytes: u64,
+    clock: u64,
+    slots: HashMap<u32, Slot<V>>,
+    /// Values that nobody uses, by the time of their last use.
+    idle: BTreeMap<u64, u32>,
+}
+
+enum Slot<V> {
+    Loading,
+    Held { value: Arc<V>, bytes: u64, users: usize, used_at: u64 },
+}
+
+/// Why a value is not to be had.
+#[derive(Debug, PartialEq, thiserror::Error)]
+pub enum CacheError<E> {
+    /// It alone is larger than the limit.
+    #[error("takes {bytes} bytes while it is read; the limit is {limit_bytes}")]
+    TooLarge {
+        /// What it takes.
+        bytes: u64,
+        /// What there is.
+        limit_bytes: u64,
+    },
+    /// This thread holds another value, and both do not fit.
+    #[error("{bytes} bytes do not fit beside what the same thread holds; the limit is {limit_bytes}")]
+    Nested {
+        /// What it takes.
+        bytes: u64,
+        /// What there is.
+        limit_bytes: u64,
+    },
+    /// What loading gave.
+    #[error("{0}")]
+    Load(E),
+}
+
+/// A value in use.
+pub struct Pin<'a, V> {
+    cache: &'a Cache<V>,
+    key: u32,
+    value: Option<Arc<V>>,
+}
+
+impl<V> Deref for Pin<'_, V> {
+    type Target = V;
+    fn deref(&self) -> &V {
+        self.value.as_ref().expect("there until it is dropped")
+    }
+}
+
+impl<V> Drop for Pin<'_, V> {
+    fn drop(&mut self) {
+        self.value = None;
+        HELD.set(HELD.get() - 1);
+        let mut state = self.cache.lock();
+        if let Some(Slot::Held { users, used_at, .. }) = state.slots.get_mut(&self.key) {
+            *users -= 1;
+            if *users == 0 {
+                let at = *used_at;
+                state.idle.insert(at, self.key);
+                self.cache.changed.notify_all();
+            }
+        }
+    }
+}
+
+impl<V> Cache<V> {
+    /// One that never holds more than `limit_bytes`.
+    pub fn new(limit_bytes: u64) -> Self {
+        let slots = HashMap::new();
+        let state = State { bytes: 0, peak_bytes: 0, clock: 0, slots, idle: BTreeMap::new() };
+        Self { limit_bytes, state: Mutex::new(state), changed: Condvar::new() }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State<V>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The most bytes that were held and on the way at once.
+    pub fn peak_bytes(&self) -> u64 {
+        self.lock().peak_bytes
+    }
+
+    /// The value with this number, loaded where it is not held. It takes `held_bytes`, and `extra_bytes` more while it is loaded.
+    /// Of several threads that ask for one value, one loads it.
+    ///
+    /// # Errors
+    /// [`CacheError`]; the next to ask loads anew.
+    pub fn get<E>(
+        &self,
+        key: u32,
+        held_bytes: u64,
+        extra_bytes: u64,
+        load: impl FnOnce() -> Result<V, E>,
+    ) -> Result<Pin<'_, V>, CacheError<E>> {
+        let bytes = held_bytes + extra_bytes;
+        let limit_bytes = self.limit_bytes;
+        if bytes > limit_bytes {
+            return Err(CacheError::TooLarge { bytes, limit_bytes });
+        }
+        let mut state = self.lock();
+        loop {
+            let loading = match state.slots.get(&key) {
+                Some(Slot::Held { .. }) => return Ok(self.pin(&mut state, key)),
+                slot => slot.is_some(),
+            };
+            // Who is loading it has its room already and waits for nobody.
+            if !loading && state.make_room(bytes, limit_bytes) {
+                break;
+            }
+            if !loading && HELD.get() > 0 {
+                return Err(CacheError::Nested { bytes, limit_bytes });
+            }
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        state.bytes += bytes;
+        state.peak_bytes = state.peak_bytes.max(state.bytes);
+        state.slots.insert(key, Slot::Loading);
+        drop(state);
+        let loaded = load();
+        let mut state = self.lock();
+        self.changed.notify_all();
+        match loaded {
+            Ok(value) => {
+                state.bytes -= extra_bytes;
+                let slot = Slot::Held { value: Arc::new(value), bytes: held_bytes, users: 0, used_at: 0 };
+                state.slots.insert(key, slot);
+                Ok(self.pin(&mut state, key))
+            }
+            Err(e) => {
+                state.bytes -= bytes;
+                state.slots.remove(&key);
+                Err(CacheError::Load(e))
+            }
+        }
+    }
+
+    fn pin(&self, state: &mut State<V>, key: u32) -> Pin<'_, V> {
+        state.clock += 1;
+        let now = state.clock;
+        let mut taken = None;
+        if let Some(Slot::Held { value, users, used_at, .. }) = state.slots.get_mut(&key) {
+            if *users == 0 {
+                state.idle.remove(used_at);
+            }
+            *users += 1;
+            *used_at = now;
+            taken = Some(value.clone());
+        }
+        HELD.set(HELD.get() + 1);
+        Pin { cache: self, key, value: taken }
+    }
+}
+
+impl<V> State<V> {
+    /// Drops idle values, the least recently used first, until `bytes` more fit; `false` where they never do.
+    fn make_room(&mut self, bytes: u64, limit_bytes: u64) -> bool {
+        while self.bytes + bytes > limit_bytes {
+            let Some((_, key)) = self.idle.pop_first() else { return false };
+            if let Some(Slot::Held { bytes, .. }) = self.slots.remove(&key) {
+                self.bytes -= bytes;
+            }
+        }
+        true
+    }
+}
