@@ -42,7 +42,12 @@ pub struct Counted {
     pub far_triangles: u64,
     /// Samples of layered depth images warped.
     pub samples: u64,
-    /// Primitives that reached the clipper, where the device counts them; a layered depth image adds one that covers the picture.
+    /// Points of payloads submitted.
+    pub points: u64,
+    /// Lines of payloads submitted.
+    pub lines: u64,
+    /// Primitives that reached the clipper, where the device counts them; a layered depth image adds one that covers the picture, a
+    /// point or a line two.
     pub clipped_primitives: Option<u64>,
 }
 
@@ -82,7 +87,8 @@ pub trait Backend {
     fn read_picture(&mut self, target: TargetId) -> Result<Picture, Fault>;
 }
 
-/// Checks that a payload part is consistent: index ranges, lengths, projector and view counts, texel counts.
+/// Checks that a payload part is consistent: index ranges, lengths, projector and view counts, texel counts; that points and lines
+/// are finite.
 ///
 /// # Errors
 /// [`Fault::Data`] naming the block and what is wrong.
@@ -112,6 +118,8 @@ pub fn validate(block: Block, data: &BlockData<'_>) -> Result<(), Fault> {
                 Ok(())
             }
             Part::Layered(l) => layered(l).map_or(Ok(()), bad),
+            Part::Points(p) => points(p).map_or(Ok(()), bad),
+            Part::Lines(l) => lines(l).map_or(Ok(()), bad),
             Part::Mesh(m) | Part::Projected(crate::payload::ProjectedPart { mesh: m, .. }) => {
                 if let Part::Projected(q) = part {
                     if q.views.len() * 3 != m.indices.len() || q.projectors.len() > 32 {
@@ -129,6 +137,34 @@ pub fn validate(block: Block, data: &BlockData<'_>) -> Result<(), Fault> {
             }
         }),
     }
+}
+
+/// What is wrong with points.
+fn points(p: &crate::payload::PointsPart) -> Option<String> {
+    if !(p.radius >= 0.0 && p.radius.is_finite()) {
+        return Some(format!("points of radius {}", p.radius));
+    }
+    vertices("point", &p.positions, p.normals.len(), p.albedo.len())
+}
+
+/// What is wrong with lines.
+fn lines(l: &crate::payload::LinesPart) -> Option<String> {
+    let n = l.positions.len();
+    if !l.indices.len().is_multiple_of(2) {
+        return Some(format!("{} indices are not whole lines", l.indices.len()));
+    }
+    let outside = l.indices.iter().find(|&&i| i as usize >= n).map(|i| format!("index {i} of {n} vertices"));
+    outside.or_else(|| vertices("vertex", &l.positions, l.normals.len(), l.albedo.len()))
+}
+
+/// What is wrong with vertices of a kind: attributes that differ in length, a position that is no place.
+fn vertices(kind: &str, positions: &[glam::Vec3], normals: usize, albedo: usize) -> Option<String> {
+    let n = positions.len();
+    if [normals, albedo] != [n; 2] {
+        return Some(format!("{n} positions, but {normals} normals and {albedo} albedos"));
+    }
+    let lost = positions.iter().position(|p| !p.is_finite());
+    lost.map(|i| format!("{kind} {i} of {n} lies at {}", positions[i]))
 }
 
 /// What is wrong with a layered depth image.
@@ -168,4 +204,59 @@ pub fn upload_scene(backend: &mut dyn Backend, scene: &Scene) -> Result<u64, Fau
         bytes += done?;
     }
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Aabb;
+    use crate::id::{AssetId, LocalPayload, PayloadRef};
+    use crate::payload::{LinesPart, Part, PointsPart};
+    use glam::{DVec3, Vec3};
+
+    fn said(part: Part) -> String {
+        let payload = Payload { origin: DVec3::ZERO, bounds: Aabb::EMPTY, parts: vec![part] };
+        let block = Block::Payload(PayloadRef { asset: AssetId(0), id: LocalPayload(0) });
+        validate(block, &BlockData::Payload(&payload)).map_or_else(|e| e.to_string(), |()| "sound".into())
+    }
+
+    #[test]
+    fn points_and_lines_that_contradict_themselves_are_refused_with_the_cause() {
+        let points = |radius, positions: Vec<Vec3>| {
+            let n = positions.len();
+            Part::Points(PointsPart {
+                positions,
+                normals: vec![Vec3::Y; n],
+                albedo: vec![[1; 4]; n],
+                radius,
+                two_sided: false,
+            })
+        };
+        let lines = |normals, indices| {
+            Part::Lines(LinesPart {
+                positions: vec![Vec3::ZERO, Vec3::X],
+                normals: vec![Vec3::Y; normals],
+                albedo: vec![[1; 4]; 2],
+                indices,
+            })
+        };
+        let cases = [
+            (points(0.0, vec![]), "sound"),
+            (points(0.5, vec![Vec3::ONE]), "sound"),
+            (points(0.5, vec![Vec3::ONE, Vec3::new(0.0, f32::NAN, 0.0)]), "point 1 of 2 lies at [0, NaN, 0]"),
+            (points(0.5, vec![Vec3::X * f32::INFINITY]), "point 0 of 1"),
+            (points(f32::NAN, vec![]), "points of radius NaN"),
+            (points(-1.0, vec![]), "points of radius -1"),
+            (points(f32::INFINITY, vec![]), "points of radius inf"),
+            (lines(2, vec![]), "sound"),
+            (lines(2, vec![0, 1, 1, 1]), "sound"),
+            (lines(2, vec![0, 1, 1]), "3 indices are not whole lines"),
+            (lines(2, vec![0, 2]), "index 2 of 2 vertices"),
+            (lines(1, vec![0, 1]), "2 positions, but 1 normals and 2 albedos"),
+        ];
+        for (part, cause) in cases {
+            let told = format!("{part:?}");
+            assert!(said(part).contains(cause), "{told}: {cause}");
+        }
+    }
 }

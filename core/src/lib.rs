@@ -18,6 +18,7 @@ pub mod claim;
 pub mod collapse;
 pub mod color;
 pub mod context;
+pub mod covered;
 pub mod draw;
 pub mod fault;
 pub mod id;

@@ -30,6 +30,44 @@ pub enum Part {
     Atlas(AtlasPart),
     /// A layered depth image, warped to the eye.
     Layered(LayeredPart),
+    /// Points, each a square splat.
+    Points(PointsPart),
+    /// Lines, one pixel wide.
+    Lines(LinesPart),
+}
+
+/// Points that stand for small pieces of surface: squares of the picture, of one size in the scene. Which pixels one covers, at what
+/// depth, and which way it faces says [`crate::covered`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PointsPart {
+    /// Positions relative to the payload's origin; finite.
+    pub positions: Vec<Vec3>,
+    /// Unit normals, local frame. Backends keep them as [`crate::image::octahedral`] does, and decide by what is kept.
+    pub normals: Vec<Vec3>,
+    /// sRGB albedo.
+    pub albedo: Vec<[u8; 4]>,
+    /// Half the edge of every splat, scene units: finite, not negative. A splat is never smaller than a pixel, so that 0 makes each
+    /// point one pixel.
+    pub radius: f32,
+    /// Drawn from behind too, with the normal turned to the eye.
+    pub two_sided: bool,
+}
+
+/// Lines, drawn one pixel wide however far away they are, from all sides: they close cracks between surfaces. Which pixels one covers,
+/// and at what depth, says [`crate::covered`].
+///
+/// Their normals stay as they are when seen from behind, as those of the one-sided surfaces beside them do: turned, they
+/// would light up along silhouettes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LinesPart {
+    /// Positions relative to the payload's origin; finite.
+    pub positions: Vec<Vec3>,
+    /// Unit normals, local frame. Backends keep them as [`crate::image::octahedral`] does.
+    pub normals: Vec<Vec3>,
+    /// sRGB albedo, mixed in linear light along a line.
+    pub albedo: Vec<[u8; 4]>,
+    /// Two indices a line.
+    pub indices: Vec<u32>,
 }
 
 /// Triangles with an albedo and a normal a vertex.
@@ -123,6 +161,25 @@ impl ProjectedPart {
     }
 }
 
+impl PointsPart {
+    /// Bytes that it takes on a GPU: position 12, normal 4, albedo 4.
+    pub fn bytes(&self) -> u64 {
+        20 * self.positions.len() as u64
+    }
+}
+
+impl LinesPart {
+    /// How many lines there are.
+    pub fn lines(&self) -> usize {
+        self.indices.len() / 2
+    }
+
+    /// Bytes that it takes on a GPU, where each line has both its ends: twice those of a point.
+    pub fn bytes(&self) -> u64 {
+        40 * self.lines() as u64
+    }
+}
+
 impl Payload {
     /// Triangles in all its parts.
     pub fn triangles(&self) -> u64 {
@@ -131,9 +188,19 @@ impl Payload {
             .map(|p| match p {
                 Part::Mesh(m) => m.indices.len() as u64 / 3,
                 Part::Projected(m) => m.mesh.indices.len() as u64 / 3,
-                Part::Atlas(_) | Part::Layered(_) => 0,
+                Part::Atlas(_) | Part::Layered(_) | Part::Points(_) | Part::Lines(_) => 0,
             })
             .sum()
+    }
+
+    /// Points in all its parts; samples of layered depth images are counted apart.
+    pub fn points(&self) -> u64 {
+        self.parts.iter().map(|p| if let Part::Points(p) = p { p.positions.len() as u64 } else { 0 }).sum()
+    }
+
+    /// Lines in all its parts.
+    pub fn lines(&self) -> u64 {
+        self.parts.iter().map(|p| if let Part::Lines(l) = p { l.lines() as u64 } else { 0 }).sum()
     }
 
     /// Samples of its layered depth images.

@@ -71,8 +71,11 @@ pub struct PipelineSummary {
     pub frame_ms_source: String,
     /// Triangles a frame.
     pub triangles: TriangleCounts,
-    /// Points a frame: samples of layered depth images.
+    /// Points a frame: samples of layered depth images, and points of payloads.
     pub points: MeanMax,
+    /// Lines a frame, of payloads; 0 in files of before there were any.
+    #[serde(default)]
+    pub lines: MeanMax,
     /// Texels resident, bytes, at most.
     pub texture_bytes: u64,
     /// Payload and geometry blocks resident, bytes, at most.
@@ -231,8 +234,10 @@ pub struct FrameRow {
     pub near_triangles: u64,
     /// Payload triangles.
     pub far_triangles: u64,
-    /// Samples of layered depth images.
+    /// Samples of layered depth images, and points of payloads.
     pub points: u64,
+    /// Lines of payloads.
+    pub lines: u64,
     /// Far blocks that were not resident.
     pub missing_blocks: u32,
     /// Bytes of blocks that the scheduler had uploaded for it.

@@ -11,6 +11,7 @@
 //! - A surface pass clears its target: albedo 0, normal 0, depth infinite, object 0 where nothing is drawn.
 //! - Of layered depth images that cover a pixel at one depth the one drawn first is seen; a smoothed one averages over those pixels
 //!   that it covers before every other image of the pass.
+//! - At one depth triangles are seen before points and points before lines; of points, the one that comes first in its part.
 //! - A pass without draws, a chunk without triangles and a part without triangles are no errors.
 
 mod contract;
@@ -20,6 +21,7 @@ mod geometry;
 mod layered;
 mod light;
 mod paint;
+mod primitives;
 mod projected;
 mod reference;
 
@@ -44,6 +46,7 @@ pub fn suite(make: Make<'_>) {
     part("paint", paint::all);
     part("projected", projected::all);
     part("layered", layered::all);
+    part("primitives", primitives::all);
     part("light", light::all);
     part("reference: soup", reference::soup);
     part("reference: instances", reference::instances);

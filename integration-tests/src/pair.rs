@@ -75,7 +75,8 @@ impl Pair {
     #[track_caller]
     pub fn check(&mut self, what: &str, list: &DrawList) -> (SurfaceImage, Picture) {
         let (a, b) = (self.wgpu.render(list).unwrap(), self.vulkan.render(list).unwrap());
-        let counts = |c: &Counted| (c.near_triangles, c.far_triangles, c.samples, c.clipped_primitives);
+        let counts =
+            |c: &Counted| (c.near_triangles, c.far_triangles, c.samples, c.points, c.lines, c.clipped_primitives);
         assert_eq!(counts(&a), counts(&b), "{what}");
         let surface = self.vulkan.read_surface(TargetId(0)).unwrap();
         let other = self.wgpu.read_surface(TargetId(0)).unwrap();

@@ -15,7 +15,7 @@ use crate::block::Ready;
 use crate::frame::{Blocks, Frame};
 use crate::tables::Tables;
 use crate::warp::SplatOrder;
-use crate::{light, paint, warp};
+use crate::{light, paint, splat, warp};
 
 /// How the backend works.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -77,7 +77,12 @@ impl CpuBackend {
                 counted.near_triangles += frame.near_triangles;
                 counted.far_triangles += frame.far_triangles;
                 counted.samples += frame.images.iter().map(|(_, i)| i.samples() as u64).sum::<u64>();
+                counted.points += frame.points.iter().map(|d| d.part.vertices.len() as u64).sum::<u64>();
+                counted.lines += frame.lines.iter().map(|d| d.part.indices.len() as u64 / 2).sum::<u64>();
                 let mut image = Self::within(pool, || paint::surface(&frame, &pass.camera, true));
+                // As on a GPU: of what lies at one depth triangles are seen first, then points, then lines.
+                splat::points(&mut image, &pass.camera, &frame.points);
+                splat::lines(&mut image, &pass.camera, &frame.lines);
                 if !frame.images.is_empty() {
                     warp::over(&mut image, &pass.camera, &frame.images, self.splats);
                 }

@@ -1,12 +1,13 @@
-//! Blocks made ready for casting: a hierarchy over the triangles, and what paints them.
+//! Blocks made ready: a hierarchy over the triangles, and what paints them; points and lines as they are drawn.
 
 use farfield_core::Fault;
 use farfield_core::backend::{BlockData, validate};
 use farfield_core::bvh::TriangleBvh;
 use farfield_core::id::Block;
+use farfield_core::image::octahedral;
 use farfield_core::layered::LayeredPart;
 use farfield_core::mesh::ChunkMesh;
-use farfield_core::payload::{AtlasPart, MeshPart, Part, Projector};
+use farfield_core::payload::{AtlasPart, LinesPart, MeshPart, Part, PointsPart, Projector};
 use glam::{DVec3, Vec2, Vec3};
 
 /// Triangles with attributes.
@@ -25,6 +26,32 @@ pub(crate) enum ReadyPart {
     Projected { surface: Surface, two_sided: bool, views: Vec<u32>, projectors: Vec<Projector> },
     Atlas(AtlasPart),
     Layered(LayeredPart),
+    Points(Points),
+    Lines(Lines),
+}
+
+/// A point, or an end of lines.
+pub(crate) struct Vertex {
+    /// Relative to the payload's origin.
+    pub(crate) position: Vec3,
+    /// Octahedral, as every backend keeps it.
+    pub(crate) normal: u32,
+    /// sRGB.
+    pub(crate) albedo: [u8; 4],
+}
+
+/// Points.
+pub(crate) struct Points {
+    pub(crate) vertices: Vec<Vertex>,
+    pub(crate) radius: f32,
+    pub(crate) two_sided: bool,
+}
+
+/// Lines.
+pub(crate) struct Lines {
+    pub(crate) vertices: Vec<Vertex>,
+    /// Two a line.
+    pub(crate) indices: Vec<u32>,
 }
 
 /// A block.
@@ -69,6 +96,11 @@ impl Surface {
     }
 }
 
+fn vertices(positions: &[Vec3], normals: &[Vec3], albedo: &[[u8; 4]]) -> Vec<Vertex> {
+    let all = positions.iter().zip(normals).zip(albedo);
+    all.map(|((&position, &normal), &albedo)| Vertex { position, normal: octahedral(normal), albedo }).collect()
+}
+
 impl Ready {
     /// # Errors
     /// [`Fault::Data`] where the block contradicts itself.
@@ -91,6 +123,14 @@ impl Ready {
                         },
                         Part::Atlas(a) => ReadyPart::Atlas(a.clone()),
                         Part::Layered(l) => ReadyPart::Layered(l.clone()),
+                        Part::Points(PointsPart { positions, normals, albedo, radius, two_sided }) => {
+                            let vertices = vertices(positions, normals, albedo);
+                            ReadyPart::Points(Points { vertices, radius: *radius, two_sided: *two_sided })
+                        }
+                        Part::Lines(LinesPart { positions, normals, albedo, indices }) => ReadyPart::Lines(Lines {
+                            vertices: vertices(positions, normals, albedo),
+                            indices: indices.clone(),
+                        }),
                     })
                     .collect(),
             },
@@ -110,6 +150,8 @@ impl Ready {
                     }
                     ReadyPart::Atlas(a) => size_of_val(&a.albedo[..]) + size_of_val(&a.normal[..]),
                     ReadyPart::Layered(l) => l.bytes() as usize,
+                    ReadyPart::Points(p) => size_of_val(&p.vertices[..]),
+                    ReadyPart::Lines(l) => size_of_val(&l.vertices[..]) + size_of_val(&l.indices[..]),
                 })
                 .sum(),
         };

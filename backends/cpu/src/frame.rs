@@ -12,7 +12,7 @@ use farfield_core::scene::{ChunkSet, Texture};
 use farfield_core::{Aabb, Fault};
 use glam::{DAffine3, DMat3, DVec3, Mat3, Vec3};
 
-use crate::block::{Ready, ReadyPart, Surface};
+use crate::block::{Lines, Points, Ready, ReadyPart, Surface};
 use crate::tables::Tables;
 
 /// Where blocks are found.
@@ -50,6 +50,15 @@ pub(crate) struct Instance<'a> {
     pub(crate) object: u32,
 }
 
+/// Points or lines in their place.
+pub(crate) struct Placed<'a, T> {
+    pub(crate) part: &'a T,
+    /// The payload's origin from the eye.
+    pub(crate) from_eye: Vec3,
+    /// What the object plane says.
+    pub(crate) object: u32,
+}
+
 /// See the module.
 #[derive(Default)]
 pub(crate) struct Frame<'a> {
@@ -58,6 +67,10 @@ pub(crate) struct Frame<'a> {
     pub(crate) top: BoxBvh,
     /// Layered depth images, each with where its payload stands.
     pub(crate) images: Vec<(DVec3, &'a LayeredPart)>,
+    /// Points, in the draws' order.
+    pub(crate) points: Vec<Placed<'a, Points>>,
+    /// Lines, in the draws' order.
+    pub(crate) lines: Vec<Placed<'a, Lines>>,
     /// Triangles of original geometry and of payloads.
     pub(crate) near_triangles: u64,
     pub(crate) far_triangles: u64,
@@ -152,11 +165,20 @@ impl<'a> Frame<'a> {
         if object == 0 {
             return Err(Fault::Refused(format!("part {part} of {id:?}: object 0 means nothing hit")));
         }
+        let from_eye = (*origin - eye).as_vec3();
         let (surface, two_sided, paint) = match parts.get(part as usize) {
             Some(ReadyPart::Mesh { surface, two_sided }) => (surface, *two_sided, Paint::Vertices),
             Some(ReadyPart::Projected { surface, two_sided, views, projectors }) => {
                 let atlases = projectors.iter().map(|p| atlas(id, p, blocks)).collect::<Result<_, _>>()?;
                 (surface, *two_sided, Paint::Projectors { views, projectors, atlases })
+            }
+            Some(ReadyPart::Points(part)) => {
+                self.points.push(Placed { part, from_eye, object });
+                return Ok(());
+            }
+            Some(ReadyPart::Lines(part)) => {
+                self.lines.push(Placed { part, from_eye, object });
+                return Ok(());
             }
             Some(ReadyPart::Atlas(_)) => {
                 return Err(Fault::Refused(format!("part {part} of {id:?} is an atlas and cannot be drawn")));

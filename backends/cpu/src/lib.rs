@@ -2,7 +2,8 @@
 //!
 //! Needs no device. Every picture that another backend draws is held against this one, and bakes capture with it where there
 //! is nothing faster. A pixel is the first surface along the ray through its centre: no rasterisation rules, no depth buffer,
-//! no level of detail. Its cost hardly depends on the number of triangles, so its times say nothing about a GPU's.
+//! no level of detail; then points, lines and the samples of layered depth images, which have no surface that a ray could meet, are drawn
+//! where they are nearer. Its cost hardly depends on the number of triangles, so its times say nothing about a GPU's.
 //!
 //! [`CpuBackend`] carries out draw lists, in parallel over the picture; [`CpuCapture`] takes captures for bakes, which are parallel
 //! over jobs, each on the thread that asks. Both cast the same rays against the same hierarchies and give the same bytes,
@@ -18,6 +19,7 @@ mod capture;
 mod frame;
 mod light;
 mod paint;
+mod splat;
 mod tables;
 mod texel;
 mod trace;

@@ -3,7 +3,8 @@
 //! Bindings. Surface shaders: group 0 holds [`ViewUniform`] (binding 0, dynamic offset into the frame's uniforms) and the
 //! frame's [`Record`]s (binding 1); group 1 holds, for chunks, the texture (0) and a repeating linear sampler (1); for
 //! projected parts, a page of [`GpuProjector`]s (0), a clamping linear sampler (1) and [`ATLAS_SLOTS`] pairs of albedo and
-//! normal arrays (2, 3), (4, 5), ...; plain meshes have no group 1. The shading shader: group 0 holds [`ShadeUniform`]
+//! normal arrays (2, 3), (4, 5), ...; for points and lines, the page of [`GpuPoint`]s or [`GpuLine`]s (0) that the vertex stage pulls its
+//! vertices out of; plain meshes have no group 1. The shading shader: group 0 holds [`ShadeUniform`]
 //! (binding 0, dynamic offset), group 1 the albedo, normal, depth and object planes (0 to 3). The shaders of layered depth images:
 //! group 0 holds [`WarpUniform`] (binding 0, dynamic offset), a page of [`GpuSample`]s (1) and the pass's splats (2), 8 bytes a
 //! pixel, written by the warp and read by what resolves it.
@@ -61,6 +62,26 @@ pub struct ProjectedVertex {
     pub color: [u8; 4],
     /// The triangle's set of projectors.
     pub views: u32,
+}
+
+/// A point, or an end of a line, as the shaders read it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct GpuPoint {
+    /// Relative to the payload's origin.
+    pub position: [f32; 3],
+    /// Octahedral, local frame.
+    pub normal: u32,
+    /// sRGB.
+    pub color: [u8; 4],
+}
+
+/// A line as the shader reads it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct GpuLine {
+    /// Its ends.
+    pub ends: [GpuPoint; 2],
 }
 
 /// A projector as the shader reads it.
@@ -155,16 +176,26 @@ pub struct Record {
     pub two_sided: u32,
     /// The index of the part's first projector in its page.
     pub first_projector: u32,
-    /// Nothing.
-    pub unused: u32,
+    /// Half the edge of a splat, scene units; of points only.
+    pub radius: f32,
 }
 
-/// A surface pass's camera.
+/// A surface pass's camera: [`farfield_core::Camera::projection`], and [`farfield_core::covered::Screen`] for points and lines.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct ViewUniform {
     /// `Camera::projection`, column by column.
     pub projection: [[f32; 4]; 4],
+    /// `Screen::across`, and pixels a unit tangent across.
+    pub across: [f32; 4],
+    /// `Screen::down`, and pixels a unit tangent down.
+    pub down: [f32; 4],
+    /// `Screen::ahead`, and the near distance.
+    pub ahead: [f32; 4],
+    /// Width and height, pixels.
+    pub size: [f32; 2],
+    /// Nothing.
+    pub unused: [f32; 2],
 }
 
 /// A light of a shading pass.
@@ -249,7 +280,7 @@ const fn at(location: u32, offset: u32, format: AttributeFormat) -> Attribute {
     Attribute { location, offset, format }
 }
 
-/// A shader's vertex attributes and the bytes of a vertex; the shading shader has none.
+/// A shader's vertex attributes and the bytes of a vertex; shaders without vertices, and those that pull them, have none.
 pub fn vertex_layout(shader: Shader) -> (u32, &'static [Attribute]) {
     use AttributeFormat::{Float32x2, Float32x3, Uint32, Unorm8x4};
     match shader {
@@ -260,7 +291,9 @@ pub fn vertex_layout(shader: Shader) -> (u32, &'static [Attribute]) {
         Shader::Projected => {
             (24, const { &[at(0, 0, Float32x3), at(1, 12, Uint32), at(2, 16, Unorm8x4), at(3, 20, Uint32)] })
         }
-        Shader::Shade | Shader::Warp | Shader::WarpHalves | Shader::Resolve => (0, &[]),
+        Shader::Points | Shader::Lines | Shader::Shade | Shader::Warp | Shader::WarpHalves | Shader::Resolve => {
+            (0, &[])
+        }
     }
 }
 
@@ -281,6 +314,8 @@ mod tests {
             ("Shade", size_of::<ShadeUniform>()),
             ("Light", size_of::<GpuLight>()),
             ("Warp", size_of::<WarpUniform>()),
+            ("Vertex", size_of::<GpuPoint>()),
+            ("Line", size_of::<GpuLine>()),
         ];
         for shader in Shader::ALL {
             let module = naga::front::wgsl::parse_str(shader.wgsl()).unwrap();

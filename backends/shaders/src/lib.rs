@@ -17,6 +17,7 @@ pub mod layout;
 pub mod pack;
 pub mod plan;
 pub mod pool;
+pub mod quads;
 pub mod readback;
 pub mod records;
 pub mod residency;
@@ -44,6 +45,10 @@ pub enum Shader {
     Mesh,
     /// The surface pass for payload meshes textured by projection.
     Projected,
+    /// The surface pass for points.
+    Points,
+    /// The surface pass for lines.
+    Lines,
     /// The shading pass.
     Shade,
     /// Throws the samples of a layered depth image, with one 64-bit atomic a pixel.
@@ -56,8 +61,17 @@ pub enum Shader {
 
 impl Shader {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Chunk, Self::Mesh, Self::Projected, Self::Shade, Self::Warp, Self::WarpHalves, Self::Resolve];
+    pub const ALL: [Self; 9] = [
+        Self::Chunk,
+        Self::Mesh,
+        Self::Projected,
+        Self::Points,
+        Self::Lines,
+        Self::Shade,
+        Self::Warp,
+        Self::WarpHalves,
+        Self::Resolve,
+    ];
 
     /// Its stages.
     pub fn stages(self) -> &'static [Stage] {
@@ -67,13 +81,23 @@ impl Shader {
         }
     }
 
-    /// The stream that its vertices come from; `None` where it has no vertices: compute, and triangles that cover the picture.
+    /// The stream that its vertices come from; `None` where it has no vertices: compute, and triangles that cover the picture, or
+    /// pulls them.
     pub fn vertices(self) -> Option<Stream> {
         match self {
             Self::Chunk => Some(Stream::ChunkVertices),
             Self::Mesh => Some(Stream::MeshVertices),
             Self::Projected => Some(Stream::ProjectedVertices),
-            Self::Shade | Self::Warp | Self::WarpHalves | Self::Resolve => None,
+            Self::Points | Self::Lines | Self::Shade | Self::Warp | Self::WarpHalves | Self::Resolve => None,
+        }
+    }
+
+    /// The stream of elements that its vertex stage pulls its vertices out of, four an element in the order of [`quads`].
+    pub fn pulled(self) -> Option<Stream> {
+        match self {
+            Self::Points => Some(Stream::Points),
+            Self::Lines => Some(Stream::Lines),
+            _ => None,
         }
     }
 
@@ -94,6 +118,18 @@ impl Shader {
                 include_str!("wgsl/common.wgsl"),
                 include_str!("wgsl/surface.wgsl"),
                 include_str!("wgsl/projected.wgsl")
+            ),
+            Self::Points => concat!(
+                include_str!("wgsl/common.wgsl"),
+                include_str!("wgsl/surface.wgsl"),
+                include_str!("wgsl/covered.wgsl"),
+                include_str!("wgsl/points.wgsl")
+            ),
+            Self::Lines => concat!(
+                include_str!("wgsl/common.wgsl"),
+                include_str!("wgsl/surface.wgsl"),
+                include_str!("wgsl/covered.wgsl"),
+                include_str!("wgsl/lines.wgsl")
             ),
             Self::Shade => concat!(
                 include_str!("wgsl/common.wgsl"),
@@ -127,6 +163,8 @@ impl Shader {
             Self::Chunk => "surface of chunks",
             Self::Mesh => "surface of payload meshes",
             Self::Projected => "surface of projected meshes",
+            Self::Points => "surface of points",
+            Self::Lines => "surface of lines",
             Self::Shade => "shading",
             Self::Warp => "warp of layered depth images",
             Self::WarpHalves => "warp of layered depth images, in halves",

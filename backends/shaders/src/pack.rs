@@ -1,13 +1,14 @@
-//! Packing: chunks and payload parts as vertices, indices, projectors and samples. O(n).
+//! Packing: chunks and payload parts as vertices, indices, projectors, samples, points and lines. O(n).
 
 use std::collections::HashMap;
 
 use farfield_core::image::octahedral;
 use farfield_core::layered::LayeredPart;
 use farfield_core::mesh::ChunkMesh;
-use farfield_core::payload::{MeshPart, ProjectedPart};
+use farfield_core::payload::{LinesPart, MeshPart, PointsPart, ProjectedPart};
+use glam::Vec3;
 
-use crate::layout::{ChunkVertex, GpuProjector, GpuSample, MeshVertex, ProjectedVertex};
+use crate::layout::{ChunkVertex, GpuLine, GpuPoint, GpuProjector, GpuSample, MeshVertex, ProjectedVertex};
 
 /// A chunk's vertices, in its order.
 pub fn chunk_vertices(c: &ChunkMesh) -> Vec<ChunkVertex> {
@@ -100,11 +101,26 @@ pub fn samples(l: &LayeredPart) -> Vec<GpuSample> {
     out
 }
 
+/// Points, in their order.
+pub fn points(p: &PointsPart) -> Vec<GpuPoint> {
+    (0..p.positions.len()).map(|i| point(p.positions[i], p.normals[i], p.albedo[i])).collect()
+}
+
+/// Lines, in their order, each with both its ends.
+pub fn lines(l: &LinesPart) -> Vec<GpuLine> {
+    let end = |i: u32| point(l.positions[i as usize], l.normals[i as usize], l.albedo[i as usize]);
+    l.indices.chunks_exact(2).map(|pair| GpuLine { ends: [end(pair[0]), end(pair[1])] }).collect()
+}
+
+fn point(position: Vec3, normal: Vec3, color: [u8; 4]) -> GpuPoint {
+    GpuPoint { position: position.to_array(), normal: octahedral(normal), color }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use farfield_core::Camera;
-    use glam::{DVec3, Vec3};
+    use glam::DVec3;
 
     #[test]
     fn triangles_share_a_vertex_only_where_they_share_their_views() {

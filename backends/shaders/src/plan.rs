@@ -1,26 +1,29 @@
 //! A draw list as batches: what is bound once, and how many draws share it.
 //!
 //! One record and one command a placed chunk or payload part, over the whole frame; a batch is a run of commands that share
-//! pipeline, pages and textures, so that a device with multi-draw-indirect takes each in one call. Draws keep their order
+//! pipeline, pages and textures, so that a device with multi-draw-indirect takes each in one call (points and lines have a command
+//! for every [`quads::QUADS`] of theirs). Draws keep their order
 //! within a batch, batches are sorted by their key: the same list over the same residency is the same plan. Layered depth images
 //! keep their order and follow the batches of their pass. O(n log batches).
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
+use farfield_core::covered::Screen;
 use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind, Shading};
 use farfield_core::id::{AssetId, Block, LocalPayload, TargetId, TextureId};
 use farfield_core::scene::LightKind;
 use farfield_core::{Camera, Fault};
 use glam::{DVec3, Vec3};
 
-use crate::Shader;
 use crate::layout::{
     ATLAS_SLOTS, DrawCommand, GpuLight, Record, ShadeUniform, UNIFORM_ALIGN, ViewUniform, WarpUniform,
 };
+use crate::pool::{Span, Stream};
 use crate::records::{Cull, SceneTable, payload_record};
 use crate::residency::{LayeredSlot, PartSlot, Residency, Slot};
 use crate::warp::{self, LayeredDraw, SPLAT_BYTES};
+use crate::{Shader, quads};
 
 /// A frame, ready to be carried out.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,6 +42,10 @@ pub struct FramePlan {
     pub far_triangles: u64,
     /// Samples of layered depth images submitted.
     pub samples: u64,
+    /// Points submitted.
+    pub points: u64,
+    /// Lines submitted.
+    pub lines: u64,
 }
 
 /// A pass.
@@ -85,13 +92,13 @@ pub struct Batch {
 /// What is bound for a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct BatchKey {
-    /// The shader; it says which stream the vertices are of.
+    /// The shader; it says which stream the vertices are of, or that they are pulled.
     pub shader: Shader,
     /// Which faces are left out.
     pub cull: Cull,
-    /// The page of vertices.
+    /// The page of vertices; that of [`Bind::Pulled`] where they are pulled.
     pub vertex_page: u32,
-    /// The page of indices.
+    /// The page of indices; 0 where vertices are pulled and [`quads::indices`] serve.
     pub index_page: u32,
     /// The bindings of group 1.
     pub bind: Bind,
@@ -104,6 +111,13 @@ pub enum Bind {
     Nothing,
     /// A scene texture, or one white texel.
     Texture(Option<TextureId>),
+    /// The elements that vertices are pulled out of.
+    Pulled {
+        /// What they are.
+        stream: Stream,
+        /// Their page.
+        page: u32,
+    },
     /// Projectors and atlases.
     Atlases {
         /// The asset whose payloads hold the atlases.
@@ -203,8 +217,7 @@ pub fn plan(
         let mut layered = vec![];
         let (uniform_offset, work) = match &pass.kind {
             PassKind::Surface => {
-                let view = ViewUniform { projection: pass.camera.projection().to_cols_array_2d() };
-                let at = out.uniform(bytemuck::bytes_of(&view));
+                let at = out.uniform(bytemuck::bytes_of(&view_uniform(&pass.camera)));
                 surfaces.insert(pass.writes, size);
                 (at, Work::Surface(surface(pass, table, residency, &mut out, &mut layered)?))
             }
@@ -258,7 +271,30 @@ struct Batches {
 }
 
 impl Batches {
+    /// Indexed triangles.
     fn push(&mut self, key: BatchKey, slot: Slot, record: u32) {
+        let command = DrawCommand {
+            index_count: slot.indices.len,
+            instance_count: 1,
+            first_index: slot.indices.first,
+            base_vertex: slot.vertices.first as i32,
+            first_instance: record,
+        };
+        self.add(key, std::iter::once(command));
+    }
+
+    /// Elements whose vertices are pulled.
+    fn push_pulled(&mut self, shader: Shader, stream: Stream, span: Span, record: u32) {
+        // Nothing has no page to bind.
+        if span.len == 0 {
+            return;
+        }
+        let bind = Bind::Pulled { stream, page: span.page };
+        let key = BatchKey { shader, cull: Cull::None, vertex_page: span.page, index_page: 0, bind };
+        self.add(key, quads::commands(span, record));
+    }
+
+    fn add(&mut self, key: BatchKey, commands: impl Iterator<Item = DrawCommand>) {
         let i = match self.last {
             Some((k, i)) if k == key => i,
             _ => *self.index.entry(key).or_insert_with(|| {
@@ -267,13 +303,7 @@ impl Batches {
             }),
         };
         self.last = Some((key, i));
-        self.draws[i].push(DrawCommand {
-            index_count: slot.indices.len,
-            instance_count: 1,
-            first_index: slot.indices.first,
-            base_vertex: slot.vertices.first as i32,
-            first_instance: record,
-        });
+        self.draws[i].extend(commands);
     }
 }
 
@@ -356,6 +386,22 @@ fn push_draw(
             if *object == 0 {
                 return Err(Fault::Refused(format!("{}: object 0 means nothing hit; a draw cannot carry it", of())));
             }
+            match payload.parts.get(usize::from(*part)) {
+                Some(&PartSlot::Points { span, radius, two_sided }) => {
+                    batches.push_pulled(Shader::Points, Stream::Points, span, out.records.len() as u32);
+                    let record = payload_record(payload.origin, camera.eye, *object, two_sided, 0);
+                    out.records.push(Record { radius, ..record });
+                    out.points += u64::from(span.len);
+                    return Ok(());
+                }
+                Some(&PartSlot::Lines { span }) => {
+                    batches.push_pulled(Shader::Lines, Stream::Lines, span, out.records.len() as u32);
+                    out.records.push(payload_record(payload.origin, camera.eye, *object, true, 0));
+                    out.lines += u64::from(span.len);
+                    return Ok(());
+                }
+                _ => {}
+            }
             let cull = |two_sided| if two_sided { Cull::None } else { Cull::Back };
             let (key, slot, two_sided, first_projector) = match payload.parts.get(usize::from(*part)) {
                 Some(PartSlot::Mesh { slot, two_sided }) => {
@@ -373,7 +419,7 @@ fn push_draw(
                 Some(PartSlot::Atlas { .. }) => {
                     return Err(Fault::Refused(format!("{} is an atlas: not drawable", of())));
                 }
-                Some(PartSlot::Layered(_)) | None => {
+                Some(PartSlot::Layered(_) | PartSlot::Points { .. } | PartSlot::Lines { .. }) | None => {
                     return Err(Fault::Refused(format!("{}: there is no such part", of())));
                 }
             };
@@ -387,6 +433,19 @@ fn push_draw(
 
 fn key(shader: Shader, cull: Cull, slot: Slot, bind: Bind) -> BatchKey {
     BatchKey { shader, cull, vertex_page: slot.vertices.page, index_page: slot.indices.page, bind }
+}
+
+/// A surface pass's uniform.
+fn view_uniform(camera: &Camera) -> ViewUniform {
+    let screen = Screen::new(camera);
+    ViewUniform {
+        projection: camera.projection().to_cols_array_2d(),
+        across: screen.across.extend(screen.px_per_tan.x).to_array(),
+        down: screen.down.extend(screen.px_per_tan.y).to_array(),
+        ahead: screen.ahead.extend(screen.near).to_array(),
+        size: screen.size.map(|s| s as f32),
+        unused: [0.0; 2],
+    }
 }
 
 /// A shading pass's uniform.

@@ -1,7 +1,7 @@
 //! Pages of device memory that many blocks share, so that one multi-draw reaches them all: which ranges are free.
 //!
 //! First fit over a sorted list of free ranges, O(free ranges) an allocation. Ranges count elements (vertices, indices,
-//! projectors), not bytes. Pages grow: the next one is as large as all before it, within limits. Pages are never given back.
+//! projectors, points), not bytes. Pages grow: the next one is as large as all before it, within limits. Pages are never given back.
 
 use std::ops::Range;
 
@@ -20,22 +20,28 @@ pub enum Stream {
     Projectors,
     /// [`crate::layout::GpuSample`] and objects of layered depth images, a read-only storage buffer.
     Samples,
+    /// [`crate::layout::GpuPoint`], a read-only storage buffer.
+    Points,
+    /// [`crate::layout::GpuLine`], a read-only storage buffer.
+    Lines,
 }
 
 impl Stream {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 8] = [
         Self::ChunkVertices,
         Self::MeshVertices,
         Self::ProjectedVertices,
         Self::Indices,
         Self::Projectors,
         Self::Samples,
+        Self::Points,
+        Self::Lines,
     ];
 
     /// Whether shaders read it through a storage binding, whose size devices bound.
     pub fn is_storage(self) -> bool {
-        matches!(self, Self::Projectors | Self::Samples)
+        matches!(self, Self::Projectors | Self::Samples | Self::Points | Self::Lines)
     }
 
     /// Bytes of an element.
@@ -47,6 +53,8 @@ impl Stream {
             Self::Indices => 4,
             Self::Projectors => 112,
             Self::Samples => 16,
+            Self::Points => 20,
+            Self::Lines => 40,
         }
     }
 }
@@ -67,7 +75,7 @@ pub struct PageSizes {
     pub first_bytes: u64,
     /// No page grows beyond.
     pub usual_bytes: u64,
-    /// What the device takes at most in one buffer (and, for projectors and samples, in one storage binding).
+    /// What the device takes at most in one buffer (and, for what shaders read as storage, in one storage binding).
     pub max_bytes: u64,
 }
 
@@ -186,7 +194,7 @@ mod tests {
 
     #[test]
     fn strides_are_those_of_the_structs() {
-        use crate::layout::{ChunkVertex, GpuProjector, GpuSample, MeshVertex, ProjectedVertex};
+        use crate::layout::{ChunkVertex, GpuLine, GpuPoint, GpuProjector, GpuSample, MeshVertex, ProjectedVertex};
         use std::mem::size_of;
         let of = [
             size_of::<ChunkVertex>(),
@@ -195,6 +203,8 @@ mod tests {
             size_of::<u32>(),
             size_of::<GpuProjector>(),
             size_of::<GpuSample>(),
+            size_of::<GpuPoint>(),
+            size_of::<GpuLine>(),
         ];
         for (stream, size) in Stream::ALL.into_iter().zip(of) {
             assert_eq!(stream.stride(), size as u64, "{stream:?}");

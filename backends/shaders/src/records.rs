@@ -102,7 +102,7 @@ impl SceneTable {
             object: row.object + 1,
             two_sided: u32::from(material.two_sided),
             first_projector: 0,
-            unused: 0,
+            radius: 0.0,
         };
         let cull = if material.two_sided { Cull::None } else { Cull::Back };
         Some(ChunkDraw { source: row.source, record, texture: material.texture, cull })
@@ -150,7 +150,7 @@ pub fn check_textures(scene: &Scene, max_px: u32) -> Result<(), Fault> {
     Ok(())
 }
 
-/// The record of a payload part: nothing is turned, its origin stands where it stands.
+/// The record of a payload part without radius: nothing is turned, its origin stands where it stands.
 pub fn payload_record(origin: DVec3, eye: DVec3, object: u32, two_sided: bool, first_projector: u32) -> Record {
     let t = (origin - eye).as_vec3();
     Record {
@@ -160,6 +160,6 @@ pub fn payload_record(origin: DVec3, eye: DVec3, object: u32, two_sided: bool, f
         object,
         two_sided: u32::from(two_sided),
         first_projector,
-        unused: 0,
+        radius: 0.0,
     }
 }

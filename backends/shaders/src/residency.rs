@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use farfield_core::backend::{BlockData, validate};
 use farfield_core::id::{AssetId, Block, LocalPayload, MeshChunkId, PayloadRef};
 use farfield_core::layered::LayeredPart;
-use farfield_core::payload::{MeshPart, Part, Payload, ProjectedPart};
+use farfield_core::payload::{LinesPart, MeshPart, Part, Payload, PointsPart, ProjectedPart};
 use farfield_core::{Camera, Fault};
 use glam::DVec3;
 
@@ -64,6 +64,20 @@ pub enum PartSlot {
     },
     /// A layered depth image.
     Layered(LayeredSlot),
+    /// Points.
+    Points {
+        /// Where they lie.
+        span: Span,
+        /// Half the edge of a splat, scene units.
+        radius: f32,
+        /// Whether they are drawn from behind too.
+        two_sided: bool,
+    },
+    /// Lines.
+    Lines {
+        /// Where they lie.
+        span: Span,
+    },
 }
 
 /// A resident payload.
@@ -99,7 +113,7 @@ pub struct Residency {
 }
 
 impl Residency {
-    /// Nothing resident. `storage_max_bytes` bounds a page of projectors or samples.
+    /// Nothing resident. `storage_max_bytes` bounds a page of what shaders read as storage.
     pub fn new(sizes: PageSizes, storage_max_bytes: u64) -> Self {
         let bound = sizes.max_bytes.min(storage_max_bytes);
         let storage = PageSizes {
@@ -173,6 +187,8 @@ impl Residency {
                     Ok(PartSlot::Atlas { empty: a.albedo.is_empty() })
                 }
                 Part::Layered(l) => self.layered(block, l, out),
+                Part::Points(p) => self.points(block, p, out),
+                Part::Lines(l) => self.lines(block, l, out),
             };
             match slot {
                 Ok(slot) => made.parts.push(slot),
@@ -234,6 +250,16 @@ impl Residency {
         Ok(PartSlot::Layered(LayeredSlot { span, samples, camera: l.camera, smooth: l.smooth }))
     }
 
+    fn points(&mut self, block: Block, p: &PointsPart, out: &mut Placement) -> Result<PartSlot, Fault> {
+        let span = self.bytes(block, Stream::Points, bytemuck::cast_slice(&pack::points(p)), out)?;
+        Ok(PartSlot::Points { span, radius: p.radius, two_sided: p.two_sided })
+    }
+
+    fn lines(&mut self, block: Block, l: &LinesPart, out: &mut Placement) -> Result<PartSlot, Fault> {
+        let span = self.bytes(block, Stream::Lines, bytemuck::cast_slice(&pack::lines(l)), out)?;
+        Ok(PartSlot::Lines { span })
+    }
+
     fn triangles(
         &mut self,
         block: Block,
@@ -293,6 +319,8 @@ impl Residency {
                     self.pools[Stream::Projectors as usize].give(*projectors);
                 }
                 PartSlot::Layered(slot) => self.pools[Stream::Samples as usize].give(slot.span),
+                PartSlot::Points { span, .. } => self.pools[Stream::Points as usize].give(*span),
+                PartSlot::Lines { span } => self.pools[Stream::Lines as usize].give(*span),
                 PartSlot::Atlas { .. } => {}
             }
         }
@@ -460,6 +488,46 @@ mod tests {
         assert!(matches!(&fault, Fault::Refused(c) if c.contains("65537 x 1 pixels")), "{fault}");
         assert!(r.payload_slot(id(0)).is_none());
         r.place(Block::Payload(id(0)), &BlockData::Payload(&image(254))).unwrap();
+    }
+
+    #[test]
+    fn points_and_lines_take_the_bytes_that_they_say_and_give_them_back() {
+        let mut r = residency(4096);
+        let with = |points: usize, lines: usize| {
+            let (positions, normals) = (vec![Vec3::ONE; points], vec![Vec3::Y; points]);
+            let albedo = vec![[1, 2, 3, 255]; points];
+            let points = PointsPart {
+                positions: positions.clone(),
+                normals: normals.clone(),
+                albedo: albedo.clone(),
+                radius: 0.25,
+                two_sided: true,
+            };
+            let lines = LinesPart { positions, normals, albedo, indices: vec![0; 2 * lines] };
+            let bytes = points.bytes() + lines.bytes();
+            let parts = vec![Part::Points(points), Part::Lines(lines)];
+            (Payload { origin: DVec3::ZERO, bounds: Aabb::EMPTY, parts }, bytes)
+        };
+        let (payload, bytes) = with(10, 3);
+        let placement = r.place(Block::Payload(id(0)), &BlockData::Payload(&payload)).unwrap();
+        assert_eq!((placement.bytes, bytes), (320, 320));
+        assert_eq!(placement.writes.iter().map(|w| w.2.len()).collect::<Vec<_>>(), [200, 120]);
+        assert_eq!([payload.points(), payload.lines(), payload.triangles()], [10, 3, 0]);
+        r.place(Block::Payload(id(1)), &BlockData::Payload(&with(5, 2).0)).unwrap();
+        let spans = |r: &Residency, n| match r.payload_slot(id(n)).unwrap().parts[..] {
+            [PartSlot::Points { span: p, radius: 0.25, two_sided: true }, PartSlot::Lines { span: l }] => {
+                [p.first, p.len, l.first, l.len]
+            }
+            ref other => panic!("{other:?}"),
+        };
+        assert_eq!([spans(&r, 0), spans(&r, 1)], [[0, 10, 0, 3], [10, 5, 3, 2]]);
+        r.release(Block::Payload(id(0)));
+        r.place(Block::Payload(id(2)), &BlockData::Payload(&with(10, 3).0)).unwrap();
+        assert_eq!(spans(&r, 2), [0, 10, 0, 3], "the freed ranges are used again");
+        // More than a storage binding: refused, and nothing is left of it.
+        let fault = r.place(Block::Payload(id(3)), &BlockData::Payload(&with(205, 1).0)).unwrap_err();
+        assert!(matches!(fault, Fault::Device { .. }), "{fault}");
+        assert!(r.payload_slot(id(3)).is_none());
     }
 
     #[test]

@@ -235,6 +235,8 @@ impl Backend for VulkanBackend {
             near_triangles: plan.near_triangles,
             far_triangles: plan.far_triangles,
             samples: plan.samples,
+            points: plan.points,
+            lines: plan.lines,
             clipped_primitives,
         })
     }

@@ -1,4 +1,4 @@
-//! Blocks on the device: pages of vertices, indices, projectors and samples, and atlases. Where things lie is decided by the shared
+//! Blocks on the device: pages of vertices, indices, projectors, samples, points and lines, and atlases. Where things lie is decided by the shared
 //! [`Residency`]; here are the buffers.
 
 use std::collections::{BTreeMap, HashMap};
@@ -66,7 +66,9 @@ impl Blocks {
                     vk::BufferUsageFlags::VERTEX_BUFFER
                 }
                 Stream::Indices => vk::BufferUsageFlags::INDEX_BUFFER,
-                Stream::Projectors | Stream::Samples => vk::BufferUsageFlags::STORAGE_BUFFER,
+                Stream::Projectors | Stream::Samples | Stream::Points | Stream::Lines => {
+                    vk::BufferUsageFlags::STORAGE_BUFFER
+                }
             };
             let usage = usage | vk::BufferUsageFlags::TRANSFER_DST;
             let name = format!("{:?} page {}", page.stream, page.index);

@@ -45,6 +45,8 @@ pub(crate) struct SetLayouts {
     pub(crate) texture: vk::DescriptorSetLayout,
     /// Projected meshes, group 1: projectors, sampler, atlases.
     pub(crate) projection: vk::DescriptorSetLayout,
+    /// Points and lines, group 1: what their vertices are pulled out of.
+    pub(crate) pulled: vk::DescriptorSetLayout,
     /// The shading shader, group 0: its uniform.
     pub(crate) shade: vk::DescriptorSetLayout,
     /// The shading shader, group 1: four planes.
@@ -63,6 +65,7 @@ impl SetLayouts {
             frame: null,
             texture: null,
             projection: null,
+            pulled: null,
             shade: null,
             planes: null,
             samples: null,
@@ -75,6 +78,7 @@ impl SetLayouts {
         made.frame = layout(gpu, &[Kind::UNIFORM_BUFFER_DYNAMIC, Kind::STORAGE_BUFFER], both)?;
         made.texture = layout(gpu, &[image, Kind::SAMPLER], fragment)?;
         made.projection = layout(gpu, &projection, fragment)?;
+        made.pulled = layout(gpu, &[Kind::STORAGE_BUFFER], vk::ShaderStageFlags::VERTEX)?;
         made.shade = layout(gpu, &[Kind::UNIFORM_BUFFER_DYNAMIC], fragment)?;
         made.planes = layout(gpu, &[image; 4], fragment)?;
         let samples = [Kind::UNIFORM_BUFFER_DYNAMIC, Kind::STORAGE_BUFFER, Kind::STORAGE_BUFFER];
@@ -88,6 +92,7 @@ impl SetLayouts {
             Shader::Chunk => vec![self.frame, self.texture],
             Shader::Mesh => vec![self.frame],
             Shader::Projected => vec![self.frame, self.projection],
+            Shader::Points | Shader::Lines => vec![self.frame, self.pulled],
             Shader::Shade => vec![self.shade, self.planes],
             Shader::Warp | Shader::WarpHalves | Shader::Resolve => vec![self.samples],
         }
@@ -96,7 +101,7 @@ impl SetLayouts {
 
 impl Drop for SetLayouts {
     fn drop(&mut self) {
-        for layout in [self.frame, self.texture, self.projection, self.shade, self.planes, self.samples] {
+        for layout in [self.frame, self.texture, self.projection, self.pulled, self.shade, self.planes, self.samples] {
             // SAFETY: made from this device, destroyed once (null is allowed).
             unsafe { self.gpu.raw.destroy_descriptor_set_layout(layout, None) };
         }

@@ -65,13 +65,16 @@ impl Recorder<'_> {
         unsafe { self.gpu.raw.cmd_bind_descriptor_sets(self.raw, point, layout, group, &[set], offset.as_slice()) };
     }
 
-    /// Binds pages of vertices and 32-bit indices.
-    pub(crate) fn pages(&self, vertices: &Buffer, indices: &Buffer) {
+    /// Binds a page of vertices.
+    pub(crate) fn vertices(&self, page: &Buffer) {
         // SAFETY: recording; pages live as long as the backend.
-        unsafe {
-            self.gpu.raw.cmd_bind_vertex_buffers(self.raw, 0, &[vertices.raw], &[0]);
-            self.gpu.raw.cmd_bind_index_buffer(self.raw, indices.raw, 0, vk::IndexType::UINT32);
-        }
+        unsafe { self.gpu.raw.cmd_bind_vertex_buffers(self.raw, 0, &[page.raw], &[0]) };
+    }
+
+    /// Binds a page of 32-bit indices.
+    pub(crate) fn indices(&self, page: &Buffer) {
+        // SAFETY: recording; pages live as long as the backend.
+        unsafe { self.gpu.raw.cmd_bind_index_buffer(self.raw, page.raw, 0, vk::IndexType::UINT32) };
     }
 
     /// Draws commands `first..first + commands.len()` of `buffer`, which holds the same commands: in as few calls as the

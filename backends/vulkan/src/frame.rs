@@ -9,11 +9,11 @@ use std::sync::Arc;
 use ash::vk;
 use farfield_core::Fault;
 use farfield_core::id::PayloadRef;
-use farfield_shaders::Shader;
 use farfield_shaders::layout::{ShadeUniform, ViewUniform};
 use farfield_shaders::plan::{Batch, Bind, FramePlan, PassPlan, Work};
 use farfield_shaders::pool::Stream;
 use farfield_shaders::records::Cull;
+use farfield_shaders::{Shader, quads};
 
 use crate::blocks::Blocks;
 use crate::descriptors::{Bound, Sets};
@@ -44,6 +44,8 @@ pub(crate) struct Frames {
     records: Buffer,
     commands: Buffer,
     uniforms: Buffer,
+    /// The indices of all points and lines.
+    quads: Buffer,
     /// Bound in slots that a part does not use.
     blank: Atlas,
     /// Bound where a part has no projectors.
@@ -75,8 +77,14 @@ impl Frames {
     /// Makes pipelines, queries and buffers.
     pub(crate) fn new(gpu: &Arc<Gpu>, blocks: &mut Blocks, by: &mut Submitter) -> Result<Self, Fault> {
         let buffer = |name, usage| Buffer::new(gpu, name, FIRST_BYTES, usage, Place::Upload);
+        let pattern = quads::indices();
+        let bytes: &[u8] = bytemuck::cast_slice(&pattern);
+        let usage = vk::BufferUsageFlags::INDEX_BUFFER | vk::BufferUsageFlags::TRANSFER_DST;
+        let quads = Buffer::new(gpu, "quads", bytes.len() as u64, usage, Place::Device)?;
+        blocks.staging.write(by, quads.raw, 0, bytes)?;
         Ok(Self {
             gpu: gpu.clone(),
+            quads,
             pipelines: Pipelines::new(gpu)?,
             queries: Queries::new(gpu)?,
             sets: Sets::new(gpu),
@@ -176,6 +184,10 @@ impl Frames {
                 let set = match bind {
                     Bind::Nothing => continue,
                     Bind::Texture(texture) => textures.set(texture.map(|t| t.index())),
+                    Bind::Pulled { stream, page } => match blocks.page(stream, page) {
+                        Some(page) => self.sets.make(layouts.pulled, &[Bound::Storage(page.raw)])?,
+                        None => continue,
+                    },
                     Bind::Atlases { asset, atlases, projector_page } => {
                         let page = projector_page.and_then(|p| blocks.page(Stream::Projectors, p));
                         let mut bound = vec![
@@ -215,20 +227,26 @@ impl Frames {
         record.pass(&to.planes, Some(&to.depth), to.size, || {
             for batch in batches {
                 let key = &batch.key;
-                let Some(stream) = key.shader.vertices() else { continue };
                 // A page that does not exist is named by draws of nothing only.
-                let (Some(vertices), Some(indices)) =
-                    (blocks.page(stream, key.vertex_page), blocks.page(Stream::Indices, key.index_page))
-                else {
-                    continue;
+                let pages = match key.shader.vertices() {
+                    Some(stream) => {
+                        let vertices = blocks.page(stream, key.vertex_page);
+                        vertices.zip(blocks.page(Stream::Indices, key.index_page)).map(|(v, i)| (Some(v), i))
+                    }
+                    // Pulled out of group 1.
+                    None => Some((None, &self.quads)),
                 };
+                let Some((vertices, indices)) = pages else { continue };
                 let layout = self.pipelines.layout(key.shader);
                 record.pipeline(self.pipelines.get(key.shader, key.cull));
                 record.set(layout, 0, sets.surface, Some(pass.uniform_offset));
                 if let Some(&set) = sets.binds.get(&key.bind) {
                     record.set(layout, 1, set, None);
                 }
-                record.pages(vertices, indices);
+                if let Some(vertices) = vertices {
+                    record.vertices(vertices);
+                }
+                record.indices(indices);
                 let commands = &plan.commands[batch.commands.start as usize..batch.commands.end as usize];
                 record.draws(&self.commands, batch.commands.start, commands);
             }

@@ -15,13 +15,20 @@ pub(crate) struct FrameBuffers {
     records: wgpu::Buffer,
     commands: wgpu::Buffer,
     uniforms: wgpu::Buffer,
+    /// The indices of all points and lines.
+    quads: wgpu::Buffer,
     view: Option<wgpu::BindGroup>,
     shade: Option<wgpu::BindGroup>,
 }
 
 impl FrameBuffers {
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Fault> {
+        let pattern = farfield_shaders::quads::indices();
+        let bytes: &[u8] = bytemuck::cast_slice(&pattern);
+        let quads = gpu.buffer("quads", bytes.len() as u64, BufferUsages::INDEX | BufferUsages::COPY_DST)?;
+        gpu.queue.write_buffer(&quads, 0, bytes);
         Ok(Self {
+            quads,
             records: gpu.buffer("records", 1 << 12, BufferUsages::STORAGE | BufferUsages::COPY_DST)?,
             commands: gpu.buffer("commands", 1 << 10, BufferUsages::INDIRECT | BufferUsages::COPY_DST)?,
             uniforms: gpu.buffer("uniforms", 1 << 12, BufferUsages::UNIFORM | BufferUsages::COPY_DST)?,
@@ -181,8 +188,7 @@ impl WgpuBackend {
         for pass in &plan.passes {
             if let Work::Surface(batches) = &pass.work {
                 for b in batches {
-                    let pages = &self.pages[Stream::Projectors as usize];
-                    self.textures.prepare(gpu, &self.pipelines, pages, b.key.bind)?;
+                    self.textures.prepare(gpu, &self.pipelines, &self.pages, b.key.bind)?;
                 }
             }
         }
@@ -242,21 +248,27 @@ impl WgpuBackend {
     }
 
     fn batch(&self, rp: &mut wgpu::RenderPass<'_>, plan: &FramePlan, b: &Batch) {
-        let Some(stream) = b.key.shader.vertices() else { return };
         let commands = &plan.commands[b.commands.start as usize..b.commands.end as usize];
-        let (Some(pipeline), Some(vertices), Some(indices)) = (
-            self.pipelines.surface(b.key.shader, b.key.cull),
-            self.pages[stream as usize].get(b.key.vertex_page as usize),
-            self.pages[Stream::Indices as usize].get(b.key.index_page as usize),
-        ) else {
+        let page = |stream: Stream, i: u32| self.pages[stream as usize].get(i as usize);
+        let vertices = b.key.shader.vertices().map(|stream| page(stream, b.key.vertex_page));
+        let indices = match vertices {
+            Some(_) => page(Stream::Indices, b.key.index_page),
+            None => Some(&self.frame.quads),
+        };
+        let (Some(pipeline), Some(indices)) = (self.pipelines.surface(b.key.shader, b.key.cull), indices) else {
             // Only a batch without any triangle has no page.
             return;
         };
+        match vertices {
+            Some(Some(page)) => rp.set_vertex_buffer(0, page.slice(..)),
+            Some(None) => return,
+            // Pulled out of group 1.
+            None => {}
+        }
         rp.set_pipeline(pipeline);
         if let Some(group) = self.textures.bind(&b.key.bind) {
             rp.set_bind_group(1, group, &[]);
         }
-        rp.set_vertex_buffer(0, vertices.slice(..));
         rp.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
         if self.gpu.indirect {
             let at = u64::from(b.commands.start) * size_of::<DrawCommand>() as u64;

@@ -8,7 +8,7 @@
 //! work without a layer between.
 //!
 //! Limits: a projected part draws from at most four atlases; the records of a frame (128 bytes a placed chunk) fit in one
-//! storage binding, as do the samples of a layered depth image and the splats of a pass (8 bytes a pixel); pages of buffers are not
+//! storage binding, as do the samples of a layered depth image, the points and the lines of a part, and the splats of a pass (8 bytes a pixel); pages of buffers are not
 //! given back before the backend is dropped.
 
 mod device;
@@ -123,7 +123,7 @@ impl WgpuBackend {
             let kind = match page.stream {
                 Stream::ChunkVertices | Stream::MeshVertices | Stream::ProjectedVertices => wgpu::BufferUsages::VERTEX,
                 Stream::Indices => wgpu::BufferUsages::INDEX,
-                Stream::Projectors | Stream::Samples => wgpu::BufferUsages::STORAGE,
+                Stream::Projectors | Stream::Samples | Stream::Points | Stream::Lines => wgpu::BufferUsages::STORAGE,
             };
             let buffer = self.gpu.buffer("page", *bytes, kind | wgpu::BufferUsages::COPY_DST)?;
             self.pages[page.stream as usize].push(buffer);
@@ -219,8 +219,16 @@ impl Backend for WgpuBackend {
             Some(q) => q.results(&self.gpu)?,
             None => (None, None),
         };
-        let (near_triangles, far_triangles, samples) = (plan.near_triangles, plan.far_triangles, plan.samples);
-        Ok(Counted { gpu_ms, wall_ms, near_triangles, far_triangles, samples, clipped_primitives })
+        Ok(Counted {
+            gpu_ms,
+            wall_ms,
+            near_triangles: plan.near_triangles,
+            far_triangles: plan.far_triangles,
+            samples: plan.samples,
+            points: plan.points,
+            lines: plan.lines,
+            clipped_primitives,
+        })
     }
 
     fn read_surface(&mut self, target: TargetId) -> Result<SurfaceImage, Fault> {

@@ -1,7 +1,7 @@
 //! Pipelines and bind group layouts, as the shared shaders want them.
 
 use farfield_shaders::layout::{
-    ATLAS_SLOTS, AttributeFormat, GpuProjector, GpuSample, Record, ShadeUniform, ViewUniform, WarpUniform,
+    ATLAS_SLOTS, AttributeFormat, GpuPoint, GpuProjector, GpuSample, Record, ShadeUniform, ViewUniform, WarpUniform,
     vertex_layout,
 };
 use farfield_shaders::records::Cull;
@@ -26,6 +26,8 @@ pub(crate) struct Pipelines {
     pub(crate) texture: wgpu::BindGroupLayout,
     /// Group 1 of projected parts.
     pub(crate) atlases: wgpu::BindGroupLayout,
+    /// Group 1 of points and lines.
+    pub(crate) pulled: wgpu::BindGroupLayout,
     /// Group 0 of shading passes.
     pub(crate) shade: wgpu::BindGroupLayout,
     /// Group 1 of shading passes.
@@ -87,6 +89,7 @@ impl Pipelines {
         let layers = sampled(filtered, TextureViewDimension::D2Array);
         entries.extend((0..2 * ATLAS_SLOTS as u32).map(|i| entry(2 + i, fragment, layers)));
         let atlases = group("atlases", &entries);
+        let pulled = group("pulled", &[entry(0, ShaderStages::VERTEX, storage(size_of::<GpuPoint>()))]);
         let shade = group("shade", &[entry(0, fragment, uniform(size_of::<ShadeUniform>()))]);
         let unfiltered = TextureSampleType::Float { filterable: false };
         let kinds = [filtered, TextureSampleType::Uint, unfiltered, TextureSampleType::Uint];
@@ -115,10 +118,14 @@ impl Pipelines {
                 surfaces.push(((shader, cull), pipeline(device, shader, cull, &groups, &PLANES)));
             }
         }
+        for shader in [Shader::Points, Shader::Lines] {
+            let made = pipeline(device, shader, Cull::None, &[Some(&view), Some(&pulled)], &PLANES);
+            surfaces.push(((shader, Cull::None), made));
+        }
         let shading = pipeline(device, Shader::Shade, Cull::None, &[Some(&shade), Some(&planes)], &[PICTURE]);
         let warp = compute(device, atomics.shader(), &warped);
         let resolve = pipeline(device, Shader::Resolve, Cull::None, &[Some(&resolved)], &PLANES);
-        Self { view, texture, atlases, shade, planes, warped, resolved, surfaces, shading, warp, resolve }
+        Self { view, texture, atlases, pulled, shade, planes, warped, resolved, surfaces, shading, warp, resolve }
     }
 
     /// The pipeline of a surface batch.

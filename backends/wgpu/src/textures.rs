@@ -8,6 +8,7 @@ use farfield_core::payload::AtlasPart;
 use farfield_core::scene::Scene;
 use farfield_shaders::layout::ATLAS_SLOTS;
 use farfield_shaders::plan::Bind;
+use farfield_shaders::pool::Stream;
 use wgpu::{BindGroupEntry, BindingResource, TextureFormat};
 
 use crate::device::Gpu;
@@ -20,7 +21,7 @@ pub(crate) struct Textures {
     /// Stands in for slots that no projector names.
     empty: wgpu::TextureView,
     clamp: wgpu::Sampler,
-    /// Of projected batches; emptied whenever an atlas or a page changes.
+    /// Of projected batches, points and lines; emptied whenever an atlas changes.
     binds: HashMap<Bind, wgpu::BindGroup>,
 }
 
@@ -117,23 +118,32 @@ impl Textures {
         }
     }
 
-    /// Makes the bind group of a projected batch where it is not there; `pages` are those of projectors.
+    /// Makes the bind group of a projected batch, of points or of lines where it is not there; `pages` are those of all streams.
     pub(crate) fn prepare(
         &mut self,
         gpu: &Gpu,
         pipelines: &Pipelines,
-        pages: &[wgpu::Buffer],
+        pages: &[Vec<wgpu::Buffer>; Stream::ALL.len()],
         bind: Bind,
     ) -> Result<(), Fault> {
-        let Bind::Atlases { asset, atlases, projector_page } = bind else { return Ok(()) };
         if self.binds.contains_key(&bind) {
             return Ok(());
         }
+        if let Bind::Pulled { stream, page } = bind {
+            let page = pages[stream as usize][page as usize].as_entire_binding();
+            let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("pulled"),
+                layout: &pipelines.pulled,
+                entries: &[BindGroupEntry { binding: 0, resource: page }],
+            });
+            self.binds.insert(bind, group);
+        }
+        let Bind::Atlases { asset, atlases, projector_page } = bind else { return Ok(()) };
         let spare;
         let projectors = match projector_page {
-            Some(p) => &pages[p as usize],
+            Some(p) => &pages[Stream::Projectors as usize][p as usize],
             None => {
-                let size = farfield_shaders::pool::Stream::Projectors.stride();
+                let size = Stream::Projectors.stride();
                 spare = gpu.buffer("no projectors", size, wgpu::BufferUsages::STORAGE)?;
                 &spare
             }
@@ -164,7 +174,7 @@ impl Textures {
         match bind {
             Bind::Nothing => None,
             Bind::Texture(t) => self.scene.get(t.map_or(self.scene.len() - 1, TextureId::index)),
-            Bind::Atlases { .. } => self.binds.get(bind),
+            Bind::Atlases { .. } | Bind::Pulled { .. } => self.binds.get(bind),
         }
     }
 }

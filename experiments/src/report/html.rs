@@ -10,7 +10,7 @@ use farfield_core::image::Picture;
 
 use super::equal;
 use super::plot::{Point, by_frame, error_against_time};
-use super::{COLUMNS, Shown};
+use super::{Shown, columns, have_lines};
 use crate::results::{FrameRow, PipelineSummary, Summary};
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1100px;margin:2em auto;padding:0 1em;color:#222}\
@@ -19,11 +19,11 @@ text-align:right}td:first-child,th:first-child,td.t{text-align:left}figure{margi
 .trio img{width:100%;image-rendering:auto}figcaption,.note{color:#666;font-size:90%}pre{background:#f6f6f6;padding:.8em;overflow:auto}\
 .bad{color:#b00;font-weight:600}";
 
-/// A pipeline as a row of [`COLUMNS`].
-pub(super) fn row(name: &str, p: &PipelineSummary) -> Vec<String> {
+/// A pipeline as a row of [`columns`].
+pub(super) fn row(name: &str, p: &PipelineSummary, with_lines: bool) -> Vec<String> {
     let e = p.error.as_ref();
     let or_dash = |v: Option<String>| v.unwrap_or_else(|| "-".into());
-    vec![
+    let mut cells = vec![
         name.to_owned(),
         format!("{:.2}", p.frame_ms.mean),
         format!("{:.2}", p.frame_ms.p95),
@@ -32,6 +32,9 @@ pub(super) fn row(name: &str, p: &PipelineSummary) -> Vec<String> {
         format!("{:.0}", p.triangles.near.mean),
         format!("{:.0}", p.triangles.far.mean),
         format!("{:.0}", p.points.mean),
+    ];
+    cells.extend(with_lines.then(|| format!("{:.0}", p.lines.mean)));
+    cells.extend([
         or_dash(e.map(|e| format!("{:.2}", e.psnr_y_db.mean))),
         or_dash(e.map(|e| format!("{:.2}", e.psnr_y_pooled_db))),
         or_dash(e.map(|e| format!("{:.2}", e.psnr_y_object_db.mean))),
@@ -42,7 +45,8 @@ pub(super) fn row(name: &str, p: &PipelineSummary) -> Vec<String> {
         or_dash(e.and_then(|e| e.temporal_change_grey_levels).map(|c| format!("{:.3}", c.mean))),
         or_dash(e.and_then(|e| e.temporal_change_at_borders_grey_levels).map(|c| format!("{:.3}", c.mean))),
         format!("{:.1}", p.preprocess.bytes_stored as f64 / 1e6),
-    ]
+    ]);
+    cells
 }
 
 pub(super) fn run(s: &Summary, frames: &[FrameRow], gallery: &[Shown]) -> io::Result<String> {
@@ -87,6 +91,13 @@ pub(super) fn run(s: &Summary, frames: &[FrameRow], gallery: &[Shown]) -> io::Re
     h += &by_frame("change since the frame before, grey levels", &series(frames, |r| r.temporal_change_grey_levels))?;
     h += &by_frame("frame time, ms", &series(frames, |r| Some(r.frame_ms)))?;
     h += &by_frame("triangles", &series(frames, |r| Some((r.near_triangles + r.far_triangles) as f64)))?;
+    // Pipelines of triangles alone have nothing to show here.
+    let counts: [(&str, fn(&FrameRow) -> u64); 2] = [("points", |r| r.points), ("lines", |r| r.lines)];
+    for (name, count) in counts {
+        if frames.iter().any(|r| count(r) > 0) {
+            h += &by_frame(name, &series(frames, |r| Some(count(r) as f64)))?;
+        }
+    }
     if !gallery.is_empty() {
         h += "<h2>Pictures</h2>";
     }
@@ -158,13 +169,15 @@ fn points(s: &Summary, prefix: &str) -> Vec<Point> {
 }
 
 fn pipelines(h: &mut String, runs: &[(String, &Summary)]) {
+    let with_lines = have_lines(runs.iter().map(|r| r.1));
     *h += "<table><tr>";
-    COLUMNS.iter().for_each(|c| push(h, format_args!("<th>{c}</th>")));
+    columns(with_lines).iter().for_each(|c| push(h, format_args!("<th>{c}</th>")));
     *h += "</tr>";
     for (prefix, s) in runs {
         for p in &s.pipelines {
             *h += "<tr>";
-            row(&format!("{prefix}{}", p.name), p).iter().for_each(|c| push(h, format_args!("<td>{}</td>", text(c))));
+            let cells = row(&format!("{prefix}{}", p.name), p, with_lines);
+            cells.iter().for_each(|c| push(h, format_args!("<td>{}</td>", text(c))));
             *h += "</tr>";
         }
     }
@@ -303,7 +316,7 @@ fn levels(h: &mut String, pipelines: &[PipelineSummary]) {
     *h += "</table>";
 }
 
-fn series(frames: &[FrameRow], value: fn(&FrameRow) -> Option<f64>) -> Vec<(String, Vec<(f64, f64)>)> {
+fn series(frames: &[FrameRow], value: impl Fn(&FrameRow) -> Option<f64>) -> Vec<(String, Vec<(f64, f64)>)> {
     let mut by: BTreeMap<usize, (String, Vec<(f64, f64)>)> = BTreeMap::new();
     let mut order: Vec<&str> = vec![];
     for r in frames {

@@ -52,13 +52,14 @@ pub fn compare(file: &Path, runs: &[(String, Summary)]) -> io::Result<String> {
 
 /// A table of pipelines as text, for terminals.
 pub fn table(runs: &[(String, Summary)]) -> String {
-    let mut rows = vec![COLUMNS.map(str::to_owned).to_vec()];
+    let with_lines = have_lines(runs.iter().map(|r| &r.1));
+    let mut rows = vec![columns(with_lines).into_iter().map(str::to_owned).collect()];
     for (run, s) in runs {
         let name = |p: &str| if runs.len() > 1 { format!("{run}: {p}") } else { p.to_owned() };
-        rows.extend(s.pipelines.iter().map(|p| html::row(&name(&p.name), p)));
+        rows.extend(s.pipelines.iter().map(|p| html::row(&name(&p.name), p, with_lines)));
     }
     let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..COLUMNS.len()).map(width).collect();
+    let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
     let line = |r: &Vec<String>| {
         let cells = r.iter().zip(&widths).enumerate();
         cells
@@ -69,8 +70,21 @@ pub fn table(runs: &[(String, Summary)]) -> String {
     rows.iter().map(|r| line(r).trim_end().to_owned() + "\n").collect()
 }
 
+/// Whether any pipeline drew lines; where none did, tables have no column of them.
+fn have_lines<'a>(runs: impl IntoIterator<Item = &'a Summary>) -> bool {
+    runs.into_iter().flat_map(|s| &s.pipelines).any(|p| p.lines.max > 0.0)
+}
+
+/// The columns that are shown.
+fn columns(with_lines: bool) -> Vec<&'static str> {
+    COLUMNS.into_iter().filter(|&c| with_lines || c != LINES).collect()
+}
+
+/// The column that is shown only where there are any.
+const LINES: &str = "lines";
+
 /// The columns of [`table`] and of the report's first table.
-const COLUMNS: [&str; 18] = [
+const COLUMNS: [&str; 19] = [
     "pipeline",
     "frame ms",
     "p95 ms",
@@ -79,6 +93,7 @@ const COLUMNS: [&str; 18] = [
     "near",
     "far",
     "points",
+    LINES,
     "PSNR-Y dB",
     "pooled dB",
     "objects dB",
@@ -109,6 +124,7 @@ mod tests {
             frame_ms_source: "wall clock".into(),
             triangles: TriangleCounts::default(),
             points: MeanMax::default(),
+            lines: MeanMax::default(),
             texture_bytes: 0,
             resident_bytes: 0,
             frames_outside_cells: 0,

@@ -74,6 +74,10 @@ pub struct Walked {
     pub far_triangles: u64,
     /// Samples of layered depth images.
     pub samples: u64,
+    /// Points of payloads.
+    pub points: u64,
+    /// Lines of payloads.
+    pub lines: u64,
     /// Blocks not there.
     pub missing: u32,
     /// Bytes that the scheduler had uploaded for it, by the far field's own account of its blocks.
@@ -185,6 +189,8 @@ impl<'a> Walker<'a> {
             near_triangles: best.near_triangles,
             far_triangles: best.far_triangles,
             samples: best.samples,
+            points: best.points,
+            lines: best.lines,
             missing: drawn.missing,
             uploaded_bytes,
             resident_bytes: self.residency.bytes,

@@ -91,7 +91,7 @@ fn compare(what: &str, make: Make<'_>, scene: &Scene, camera: &Camera, share: f3
     assert!(other as f32 <= share * n as f32, "{what}: {other} of {n} pixels differ from the reference");
 }
 
-fn same(a: &SurfaceImage, b: &SurfaceImage, i: usize) -> bool {
+pub(super) fn same(a: &SurfaceImage, b: &SurfaceImage, i: usize) -> bool {
     if !a.hit(i) {
         return !b.hit(i) && b.depth[i] == f32::INFINITY;
     }

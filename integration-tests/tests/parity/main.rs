@@ -8,6 +8,7 @@
 //! `benches/frame_times.rs` prints frame times of both.
 
 mod layered;
+mod primitives;
 
 use std::collections::BTreeSet;
 

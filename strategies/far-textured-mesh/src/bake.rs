@@ -165,7 +165,7 @@ fn mesh_bytes(p: &Payload) -> u64 {
         .map(|part| match part {
             Part::Mesh(m) => of(m),
             Part::Projected(q) => of(&q.mesh) + q.views.len() as u64 * 4 + q.projectors.len() as u64 * 100,
-            Part::Atlas(_) | Part::Layered(_) => 0,
+            Part::Atlas(_) | Part::Layered(_) | Part::Points(_) | Part::Lines(_) => 0,
         })
         .sum()
 }

@@ -1,8 +1,16 @@
-// What the three surface shaders share: a pass's camera, the draw records, the vertex's place, the planes that they fill.
+// What the surface shaders share: a pass's camera, the draw records, the vertex's place, the planes that they fill.
 
 struct View {
     // From positions relative to the eye to clip space; w is linear depth.
     projection: mat4x4<f32>,
+    // Screen of farfield-core: from positions relative to the eye to columns times depth, rows times depth, depth; in w pixels a
+    // unit tangent across and down, and the near distance.
+    across: vec4<f32>,
+    down: vec4<f32>,
+    ahead: vec4<f32>,
+    // Width and height, pixels.
+    size: vec2<f32>,
+    unused: vec2<f32>,
 }
 
 struct Record {
@@ -22,7 +30,8 @@ struct Record {
     two_sided: u32,
     // The first of the part's projectors.
     first_projector: u32,
-    unused: u32,
+    // Of points.
+    radius: f32,
 }
 
 struct Planes {

@@ -191,7 +191,11 @@ impl<'a, C: Corner> Intake<'a, C> {
                 }
                 let i = self.triangles.len();
                 if i == u64::from(u32::MAX) {
-                    return Err(LoadError::data(self.file, mesh.place_of(number), "there are more than 2^32 triangles"));
+                    return Err(LoadError::data(
+                        self.file,
+                        mesh.place_of(number),
+                        "there are more than 2^32 triangles",
+                    ));
                 }
                 match mesh.runs.last_mut() {
                     Some((m, r)) if *m == material && r.end == i => r.end = i + 1,
