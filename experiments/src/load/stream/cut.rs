@@ -30,6 +30,9 @@ const CELLS: usize = 1 << (3 * LEVELS);
 /// Turns x round.
 pub(super) const MIRROR: DAffine3 = DAffine3::from_cols(DVec3::new(-1.0, 0.0, 0.0), DVec3::Y, DVec3::Z, DVec3::ZERO);
 
+/// Gets a batch of triangles and the number of the first.
+type Each<'f, C> = dyn FnMut(u64, &[[C; 3]]) -> io::Result<()> + 'f;
+
 /// Triangles of one material, as ranges of the intake's.
 pub(super) struct Section {
     material: u32,
@@ -96,11 +99,7 @@ impl<C: Corner> Scope<'_, '_, C> {
     }
 
     /// A section's triangles, a batch at a time, with the number of the first in the section.
-    pub(super) fn batches(
-        &self,
-        section: &Section,
-        f: &mut dyn FnMut(u64, &[[C; 3]]) -> io::Result<()>,
-    ) -> io::Result<()> {
+    pub(super) fn batches(&self, section: &Section, f: &mut Each<'_, C>) -> io::Result<()> {
         let (most, mut held, mut number) = (self.intake.work.batch as u64, vec![], 0);
         for run in &section.runs {
             let mut at = run.start;

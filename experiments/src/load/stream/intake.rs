@@ -145,7 +145,10 @@ impl<'a, C: Corner> Intake<'a, C> {
         let at = self.positions.gather(&places).map_err(&failed)?;
         let mesh = self.meshes.last_mut().expect("faces follow a mesh");
         let ends = places.ends();
-        mesh.positions = mesh.positions.start.min(ends.start)..mesh.positions.end.max(ends.end);
+        mesh.positions = match mesh.positions.is_empty() {
+            true => ends,
+            false => mesh.positions.start.min(ends.start)..mesh.positions.end.max(ends.end),
+        };
         mesh.colors = mesh.colors || given(self.colors.array.as_ref(), &places, |c| c[3] != 0).map_err(&failed)?;
         if !mesh.uvs {
             let named: Vec<u32> = corners.iter().filter_map(|c| c.uv()).collect();
@@ -229,7 +232,7 @@ impl<C: Corner> Sink<C> for Intake<'_, C> {
             runs: vec![],
             low: DVec3::INFINITY,
             high: DVec3::NEG_INFINITY,
-            positions: u32::MAX..0,
+            positions: 0..0,
             uvs: false,
             colors: false,
             normals_given: false,

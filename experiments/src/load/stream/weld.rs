@@ -82,7 +82,7 @@ fn stand_ins<C: Corner>(scope: &Scope<'_, '_, C>, order: &mut Array<u32>, used: 
             let [x, y, z] = (scope.place(p) + Vec3::ZERO).to_array().map(f32::to_bits);
             let hash = (x.wrapping_mul(0x9e37_79b1) ^ y.rotate_left(11).wrapping_mul(0x85eb_ca77))
                 .wrapping_add(z.rotate_left(22).wrapping_mul(0xc2b2_ae3d));
-            let part = (u64::from(hash ^ hash >> 15) * parts as u64 >> 32) as usize;
+            let part = ((u64::from(hash ^ (hash >> 15)) * parts as u64) >> 32) as usize;
             spill.push(part, [x, y, z, n, (at + i as u64) as u32])?;
         }
     }
