@@ -80,7 +80,8 @@ impl Piece {
         let mut sums = vec![Vec3::ZERO; m.positions.len()];
         for &c in &m.corners {
             let ([a, b, d], v) = (m.places(c), m.vertices(c));
-            let large = !(a.distance(b).max(b.distance(d)).max(d.distance(a)) < size);
+            let edges = [a.distance(b), b.distance(d), d.distance(a)];
+            let large = edges.iter().any(|e| e.is_nan() || *e >= size);
             let mean = c.iter().map(|&w| m.wedges[w as usize].normal).sum::<Vec3>();
             for v in v {
                 kept[v as usize] |= large;
@@ -105,7 +106,7 @@ impl Piece {
         metric: &dyn SimplificationMetric,
     ) -> Result<Self, Fault> {
         let budget = allowance - self.error;
-        if !(budget > 0.0) || self.mesh.corners.is_empty() {
+        if budget.is_nan() || budget <= 0.0 || self.mesh.corners.is_empty() {
             return Ok(self);
         }
         let m = &self.mesh;

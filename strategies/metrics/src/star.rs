@@ -123,8 +123,7 @@ impl Star {
         }
         let Some(normal) = sum.try_normalize() else { return };
         let (across, up) = normal.any_orthonormal_pair();
-        for i in 0..n {
-            let arm = arms[i];
+        for (i, arm) in arms[..n].iter().enumerate() {
             for at in [i, i + n] {
                 (self.x[at], self.y[at], self.height[at]) = (arm.dot(across), arm.dot(up), arm.dot(normal));
             }
@@ -186,7 +185,7 @@ impl Star {
                 let over = 1.0 / (x[i] * dy - y[i] * dx);
                 let (s, t) = (turn * over, (qx * y[i] - qy * x[i]) * over);
                 let off = (s * h[i] - (qh + t * dh)).abs();
-                let within = |v: f32| (v >= -ROUNDING) & (v <= 1.0 + ROUNDING);
+                let within = |v: f32| (v - 0.5).abs() <= 0.5 + ROUNDING;
                 let off = if within(s) & within(t) { off } else { 0.0 };
                 most[i] = if off > most[i] { off } else { most[i] };
             }
