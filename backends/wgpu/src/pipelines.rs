@@ -1,7 +1,7 @@
 //! Pipelines and bind group layouts, as the shared shaders want them.
 
 use farfield_shaders::layout::{
-    ATLAS_SLOTS, AttributeFormat, GpuPoint, GpuProjector, GpuSample, Record, ShadeUniform, ViewUniform, WarpUniform,
+    ATLAS_SLOTS, AttributeFormat, GpuLine, GpuProjector, GpuSample, Record, ShadeUniform, ViewUniform, WarpUniform,
     vertex_layout,
 };
 use farfield_shaders::records::Cull;
@@ -89,7 +89,8 @@ impl Pipelines {
         let layers = sampled(filtered, TextureViewDimension::D2Array);
         entries.extend((0..2 * ATLAS_SLOTS as u32).map(|i| entry(2 + i, fragment, layers)));
         let atlases = group("atlases", &entries);
-        let pulled = group("pulled", &[entry(0, ShaderStages::VERTEX, storage(size_of::<GpuPoint>()))]);
+        // The larger element; pages hold thousands of either.
+        let pulled = group("pulled", &[entry(0, ShaderStages::VERTEX, storage(size_of::<GpuLine>()))]);
         let shade = group("shade", &[entry(0, fragment, uniform(size_of::<ShadeUniform>()))]);
         let unfiltered = TextureSampleType::Float { filterable: false };
         let kinds = [filtered, TextureSampleType::Uint, unfiltered, TextureSampleType::Uint];

@@ -21,7 +21,8 @@ fn stars(count: usize, radius: f32, two_sided: bool, seed: u64) -> Payload {
         let mut unit = || rng.random_range(-1f32..1.0);
         let normal = Vec3::new(unit(), unit(), unit()).normalize_or(Vec3::Y);
         positions.push(normal * (1.0 + 5.0 * (i % 7) as f32 / 6.0));
-        normals.push(normal);
+        // Every other one inward, so that some face an eye in the middle.
+        normals.push(if i % 2 == 0 { normal } else { -normal });
         albedo.push([rng.random(), rng.random(), rng.random(), 255]);
     }
     // Short ones between neighbours in the list would be as long as any: each to a place close by.
@@ -42,7 +43,7 @@ fn points_and_lines_are_the_same() {
     let scene = vases(12, DVec3::ZERO, 21);
     let Some(mut pair) = pair("points_and_lines_are_the_same", &scene) else { return };
     let id = |n| PayloadRef { asset: AssetId(2), id: LocalPayload(n) };
-    let payloads = [stars(20_011, 0.02, false, 22), stars(3_001, 0.15, true, 23), stars(50, 0.0, false, 24)];
+    let payloads = [stars(20_011, 0.02, false, 22), stars(3_001, 0.15, true, 23), stars(500, 0.0, false, 24)];
     for (n, p) in (0..).zip(&payloads) {
         pair.upload(id(n), p);
     }
