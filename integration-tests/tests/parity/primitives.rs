@@ -43,7 +43,7 @@ fn points_and_lines_are_the_same() {
     let scene = vases(12, DVec3::ZERO, 21);
     let Some(mut pair) = pair("points_and_lines_are_the_same", &scene) else { return };
     let id = |n| PayloadRef { asset: AssetId(2), id: LocalPayload(n) };
-    let payloads = [stars(20_011, 0.02, false, 22), stars(3_001, 0.15, true, 23), stars(500, 0.0, false, 24)];
+    let payloads = [stars(20_011, 0.02, false, 22), stars(3_001, 0.05, true, 23), stars(500, 0.0, false, 24)];
     for (n, p) in (0..).zip(&payloads) {
         pair.upload(id(n), p);
     }
