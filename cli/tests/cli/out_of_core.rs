@@ -53,7 +53,9 @@ fn pictures_and_stored_bytes_are_those_of_the_scene_in_memory() {
     let scenes: Vec<_> = b.keys().filter(|k| k.starts_with("scenes")).cloned().collect();
     assert_eq!(scenes.len(), 1);
     scenes.iter().for_each(|s| _ = b.remove(s));
-    assert!(a.len() > 10 && a == b);
+    // A store may remember the model's digest, too, once the file is old enough.
+    assert!(a.len() > 10 && a.iter().all(|(name, bytes)| b.get(name) == Some(bytes)));
+    assert!(b.len() <= a.len() + 1, "{} blocks more", b.len() - a.len());
 }
 
 #[test]
@@ -104,10 +106,9 @@ fn eight_million_triangles_are_cut_in_256_mb() {
     let disk = limited(&f, true);
     assert!(disk.status.success(), "{}", String::from_utf8_lossy(&disk.stderr));
     // Again: without the limit on what is held being asked for, it is what the size of the file says.
-    let said =
-        String::from_utf8_lossy(&f.run(&["build", "asteroid.toml", "--set", "scene.memory_bytes=134217728"]).stderr)
-            .into_owned();
-    assert!(!said.contains("is cut into chunks"), "the file is there: {said}");
+    let again = f.run(&["build", "asteroid.toml", "--set", "scene.memory_bytes=134217728"]);
+    let said = String::from_utf8_lossy(&again.stderr).into_owned();
+    assert!(again.status.success() && !said.contains("is cut into chunks"), "the file is there: {said}");
     let scene = std::fs::read_dir(f.path("store/scenes")).unwrap().next().unwrap().unwrap();
     assert!(scene.metadata().unwrap().len() > 100 << 20);
 }

@@ -113,6 +113,9 @@ impl SceneBuilder {
                 });
             }
             hash.update(&m.digest);
+            for c in &m.chunks {
+                hash.update(bytemuck::cast_slice(&[c.material.0, c.triangles, c.vertices]));
+            }
         }
         for m in &self.materials {
             hash.update(serde_json::to_string(m).unwrap_or_default().as_bytes());
@@ -242,6 +245,20 @@ mod tests {
         for (a, b) in home.chunks.iter().zip(&away.chunks) {
             assert!(a.bounds.min.distance(b.bounds.min) < 1e-6 && a.bounds.max.distance(b.bounds.max) < 1e-6);
         }
+    }
+
+    #[test]
+    fn the_digest_tells_which_material_a_mesh_wears() {
+        let of = |material: u32| {
+            let red = Material { base_color: [1.0, 0.0, 0.0, 1.0], ..Material::default() };
+            let mut b = SceneBuilder { materials: vec![Material::default(), red], ..Default::default() };
+            let sections = vec![(0..3, MaterialId(material))];
+            let mesh = b.mesh("triangle", TriangleMesh { sections, ..triangle() }).unwrap();
+            b.place(Placement { mesh, transform: DAffine3::IDENTITY });
+            b.build().unwrap().digest
+        };
+        assert_eq!(of(0), of(0));
+        assert_ne!(of(0), of(1));
     }
 
     #[test]

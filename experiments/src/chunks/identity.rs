@@ -1,7 +1,7 @@
 //! What a file's contents are, without reading a file again that has not changed.
 //!
 //! A file is known by its path, length, time of change and number (inode). Where the store has seen exactly that before, it knows
-//! the digest of the contents. As with git's index, a file that changed within the last two seconds is not remembered: it could
+//! the digest of the contents. As with git's index, a file that changed within the two seconds before it was read is not remembered: it could
 //! change again without its time of change telling.
 
 use std::fs::{File, Metadata};
@@ -17,7 +17,11 @@ use crate::store::{Key, Store, key};
 /// What reading gives.
 pub fn digest(store: &Store, file: &Path) -> io::Result<[u8; 32]> {
     let path = std::path::absolute(file)?;
-    let before = std::fs::metadata(&path)?;
+    let (before, began) = (std::fs::metadata(&path)?, SystemTime::now());
+    // Devices and pipes may never end.
+    if !before.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is no file"));
+    }
     let name = stamp(&path, &before)?;
     if let Some(known) = store.get(&name).and_then(|b| b.try_into().ok()) {
         return Ok(known);
@@ -32,7 +36,7 @@ pub fn digest(store: &Store, file: &Path) -> io::Result<[u8; 32]> {
         }
     }
     let made = *hash.finalize().as_bytes();
-    let settled = SystemTime::now().duration_since(changed(&before)?).is_ok_and(|age| age > Duration::from_secs(2));
+    let settled = began.duration_since(changed(&before)?).is_ok_and(|age| age > Duration::from_secs(2));
     if settled && stamp(&path, &std::fs::metadata(&path)?)? == name {
         store.put(&name, &made)?;
     }

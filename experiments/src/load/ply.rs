@@ -283,6 +283,9 @@ pub(super) fn parse(
             _ => body.each(def, |_, _: Skipped| Ok(()))?,
         }
     }
+    // To the end: only there a gzip stream's checksum is looked at.
+    std::io::copy(&mut body.data, &mut std::io::sink())
+        .map_err(|cause| LoadError::Read { file: path.to_owned(), cause })?;
     let mut warnings = vec![];
     let mut material = plain("default");
     if let Some(name) = header.comments.iter().find_map(|c| c.trim().strip_prefix("TextureFile "))

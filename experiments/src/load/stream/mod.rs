@@ -96,7 +96,7 @@ pub struct Streamed {
     pub warnings: Vec<String>,
 }
 
-/// The bytes of a file or of a folder's model files, gzipped ones counted threefold; `None` where one of them cannot be read piece by piece.
+/// The bytes of a file or of a folder's model files, with the buffers that glTF files name, gzipped ones counted threefold; `None` where one of them cannot be read piece by piece.
 ///
 /// # Errors
 /// What looking at the files gives.
@@ -108,9 +108,19 @@ pub fn bytes(path: &Path) -> Result<Option<u64>, LoadError> {
             return Ok(None);
         }
         let unpacks = if file.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) { 3 } else { 1 };
+        if file.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
+            sum += buffers(&file);
+        }
         sum += unpacks * std::fs::metadata(&file).map_err(|cause| LoadError::Read { file, cause })?.len();
     }
     Ok(Some(sum))
+}
+
+/// The bytes of all buffers that a glTF file names; 0 where it cannot be read, which loading will tell.
+fn buffers(file: &Path) -> u64 {
+    let json = super::bytes::read(file).ok().and_then(|b| serde_json::from_slice::<serde_json::Value>(&b).ok());
+    let all = json.as_ref().and_then(|j| j["buffers"].as_array());
+    all.into_iter().flatten().filter_map(|b| b["byteLength"].as_u64()).fold(0, u64::saturating_add)
 }
 
 #[derive(Clone, Copy)]
