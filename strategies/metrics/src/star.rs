@@ -10,6 +10,9 @@ use glam::{Vec2, Vec3};
 const MOST: usize = 16;
 /// How far parts of an edge or of a triangle may lie outside it after rounding.
 pub(crate) const ROUNDING: f32 = 1e-4;
+/// The squared sine below which edges run along each other instead of crossing: where they meet would be rounding, and the distance along
+/// them is that at their ends.
+const PARALLEL: f32 = 1e-8;
 /// Stars that are remembered: those of about as many edges as are priced in one call.
 const REMEMBERED: usize = 512;
 
@@ -180,13 +183,15 @@ impl Star {
         let mut most = [0f32; W];
         for m in j + 2..j + n - 1 {
             let (dx, dy, dh) = (self.x[m] - qx, self.y[m] - qy, self.height[m] - qh);
-            let turn = qx * dy - qy * dx;
+            let (turn, least) = (qx * dy - qy * dx, PARALLEL * (dx * dx + dy * dy));
             for i in 0..W {
-                let over = 1.0 / (x[i] * dy - y[i] * dx);
+                let area = x[i] * dy - y[i] * dx;
+                let over = 1.0 / area;
                 let (s, t) = (turn * over, (qx * y[i] - qy * x[i]) * over);
                 let off = (s * h[i] - (qh + t * dh)).abs();
                 let within = |v: f32| (v - 0.5).abs() <= 0.5 + ROUNDING;
-                let off = if within(s) & within(t) { off } else { 0.0 };
+                let crosses = area * area > least * (x[i] * x[i] + y[i] * y[i]);
+                let off = if within(s) & within(t) & crosses { off } else { 0.0 };
                 most[i] = if off > most[i] { off } else { most[i] };
             }
         }
