@@ -27,6 +27,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::hausdorff::{Deviation, Patch, weights};
+use crate::star::ROUNDING;
 
 /// A difference of attributes that nobody sees: radians of a normal, since |d cos| <= |d angle|, and parts of white of an albedo.
 const LEAST: f32 = 0.5 / 255.0;
@@ -88,8 +89,8 @@ impl<'a> Looks<'a> {
         let mut most = 0f32;
         for i in 0..self.all.len() {
             let v = self.all[i];
-            if let Some(foot) = foot(mesh, patch, onto, self.positions[v as usize]) {
-                most = most.max(self.distance(mesh, v, &foot));
+            if let Some((_, distance)) = self.foot(mesh, patch, onto, v) {
+                most = most.max(distance);
             }
             if most > limit {
                 return f32::INFINITY;
@@ -104,8 +105,8 @@ impl<'a> Looks<'a> {
         patch.gone.iter().chain(patch.moved.iter().map(|m| &m.0)).for_each(|&t| self.under[t as usize].clear());
         for i in 0..self.all.len() {
             let v = self.all[i];
-            if let Some(foot) = foot(mesh, patch, onto, self.positions[v as usize]) {
-                self.under[foot.triangle as usize].push(v);
+            if let Some((triangle, _)) = self.foot(mesh, patch, onto, v) {
+                self.under[triangle as usize].push(v);
             } else if let Some(&t) = mesh.triangles_of(onto).iter().find(|t| !patch.gone.contains(t)) {
                 self.under[t as usize].push(v);
             }
@@ -118,6 +119,41 @@ impl<'a> Looks<'a> {
         for &t in patch.gone.iter().chain(patch.moved.iter().map(|m| &m.0)) {
             self.all.extend_from_slice(&self.under[t as usize]);
         }
+    }
+
+    /// The new triangle that covers a dead vertex, with how far the vertex's looks are there: along the patch's normal, where several do, on
+    /// an edge, the one whose looks are nearest, so that rounding does not choose; where none does, the nearest triangle. `None` where no triangle
+    /// moves.
+    fn foot(&self, mesh: &LiveMesh, patch: &Patch, onto: u32, v: u32) -> Option<(u32, f32)> {
+        let (at, q) = (self.positions[v as usize], mesh.position(onto));
+        let mut best: Option<(u32, f32)> = None;
+        let foot = |triangle, [x, y]: [u32; 2], weights| Foot { triangle, corners: [onto, x, y], weights };
+        if patch.normal != Vec3::ZERO {
+            let (across, up) = patch.normal.any_orthonormal_pair();
+            let flat = |v: Vec3| Vec2::new((v - q).dot(across), (v - q).dot(up));
+            for &(t, pair) in &patch.moved {
+                let [a, b] = pair.map(|v| flat(mesh.position(v)));
+                let [u, w] = weights([Vec2::ZERO, a, b], flat(at));
+                if u.min(w).min(1.0 - u - w) >= -ROUNDING {
+                    let distance = self.distance(mesh, v, &foot(t, pair, [1.0 - u - w, u, w]));
+                    if best.is_none_or(|b| distance < b.1) {
+                        best = Some((t, distance));
+                    }
+                }
+            }
+        }
+        best.or_else(|| {
+            let mut nearest: Option<(f64, Foot)> = None;
+            for &(t, pair) in &patch.moved {
+                let [a, b] = pair.map(|v| mesh.position(v));
+                let (point, w) = nearest_on_triangle(at.as_dvec3(), [q, a, b].map(|v| v.as_dvec3()));
+                let d = point.distance_squared(at.as_dvec3());
+                if nearest.is_none_or(|n| d < n.0) {
+                    nearest = Some((d, foot(t, pair, w.map(|w| w as f32))));
+                }
+            }
+            nearest.map(|n| (n.1.triangle, self.distance(mesh, v, &n.1)))
+        })
     }
 
     /// How far the looks of a dead vertex are from its foot.
@@ -163,30 +199,6 @@ struct Foot {
     triangle: u32,
     corners: [u32; 3],
     weights: [f32; 3],
-}
-
-/// The new triangle that covers a point: along the patch's normal, or, where that covers it by none, the nearest one. `None` where no
-/// triangle moves.
-fn foot(mesh: &LiveMesh, patch: &Patch, onto: u32, at: Vec3) -> Option<Foot> {
-    let q = mesh.position(onto);
-    let axes = (patch.normal != Vec3::ZERO).then(|| patch.normal.any_orthonormal_pair());
-    let mut nearest: Option<(f64, Foot)> = None;
-    for &(triangle, [x, y]) in &patch.moved {
-        let (a, b, corners) = (mesh.position(x), mesh.position(y), [onto, x, y]);
-        if let Some((across, up)) = axes {
-            let flat = |v: Vec3| Vec2::new((v - q).dot(across), (v - q).dot(up));
-            let [u, v] = weights([Vec2::ZERO, flat(a), flat(b)], flat(at));
-            if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
-                return Some(Foot { triangle, corners, weights: [1.0 - u - v, u, v] });
-            }
-        }
-        let (point, w) = nearest_on_triangle(at.as_dvec3(), [q, a, b].map(|v| v.as_dvec3()));
-        let d = point.distance_squared(at.as_dvec3());
-        if nearest.is_none_or(|n| d < n.0) {
-            nearest = Some((d, Foot { triangle, corners, weights: w.map(|w| w as f32) }));
-        }
-    }
-    nearest.map(|n| n.1)
 }
 
 #[cfg(test)]

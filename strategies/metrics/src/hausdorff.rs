@@ -101,20 +101,19 @@ impl<'a> Deviation<'a> {
     fn bound(&mut self, mesh: &LiveMesh, from: u32, onto: u32) -> Option<(f32, f32, Vec3)> {
         let (p, length) = (mesh.position(from), mesh.position(from).distance(mesh.position(onto)));
         if let Some(star) = self.stars.of(mesh, from, &self.bounds) {
-            let (before, longest) = (star.before, star.longest);
+            let before = star.before;
             let (moved, normal) = match star.distance(onto) {
                 Some(d) => (d, star.normal),
                 None => (length, Vec3::ZERO),
             };
-            let scale = self.scale(p, longest);
+            let scale = self.scale(p, length);
             return Some((before + moved * scale, scale, normal));
         }
         if !self.patch.gather(mesh, from, onto) {
             return None;
         }
         let moved = self.patch.distance(mesh, from, onto).unwrap_or(length);
-        let longest = self.patch.spokes.iter().map(|s| mesh.position(s.0).distance(p)).fold(length, f32::max);
-        let scale = self.scale(p, longest);
+        let scale = self.scale(p, length);
         let before = mesh.triangles_of(from).iter().map(|&t| self.bounds[t as usize]).fold(0.0, f32::max);
         Some((before + moved * scale, scale, self.patch.normal))
     }

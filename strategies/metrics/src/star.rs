@@ -30,8 +30,6 @@ pub(crate) struct Star {
     pub(crate) normal: Vec3,
     /// The largest bound of its triangles.
     pub(crate) before: f32,
-    /// Its longest edge, scene units.
-    pub(crate) longest: f32,
 }
 
 /// Stars by vertex, as long as nothing collapses.
@@ -74,7 +72,6 @@ impl Star {
             height: [0.0; 2 * MOST],
             normal: Vec3::ZERO,
             before: 0.0,
-            longest: 0.0,
         };
         let triangles = mesh.triangles_of(vertex);
         let n = triangles.len();
@@ -117,9 +114,7 @@ impl Star {
         let mut arms = [Vec3::ZERO; MOST];
         for (arm, &v) in arms.iter_mut().zip(&self.ids[..n]) {
             *arm = mesh.position(v) - p;
-            self.longest = self.longest.max(arm.length_squared());
         }
-        self.longest = self.longest.sqrt();
         let mut sum = Vec3::ZERO;
         for i in 0..n {
             sum += arms[i].cross(arms[(i + 1) % n]);
