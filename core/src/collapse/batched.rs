@@ -101,7 +101,8 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
         }
         starved = done * 8 < found || done == 0;
     }
-    state.mesh.finish(state.collapses, state.max_cost)
+    let total = if state.collapses > 0 { state.cost.total(&state.mesh, state.max_cost) } else { 0.0 };
+    state.mesh.finish(state.collapses, total)
 }
 
 struct Batched<'a, C: ?Sized> {

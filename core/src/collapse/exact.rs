@@ -79,7 +79,8 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
         collapses += 1;
         max_cost = max_cost.max(price);
     }
-    state.mesh.finish(collapses, max_cost)
+    let total = if collapses > 0 { state.cost.total(&state.mesh, max_cost) } else { 0.0 };
+    state.mesh.finish(collapses, total)
 }
 
 impl<'a, C: Cost + ?Sized> Exact<'a, C> {

@@ -182,7 +182,8 @@ impl LiveMesh {
     }
 
     /// Number of triangles of the input, dead ones included.
-    pub(super) fn all_triangles(&self) -> usize {
+    #[inline]
+    pub fn all_triangles(&self) -> usize {
         self.triangles.len()
     }
 

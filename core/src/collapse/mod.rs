@@ -107,6 +107,13 @@ pub trait Cost {
         let _ = (mesh, from, onto, at);
     }
 
+    /// What all that was collapsed costs together, where the dearest edge cost `dearest`; asked once, at the end. A cost that prices edges by
+    /// samples may measure here what has become of the whole. Default: `dearest`.
+    fn total(&mut self, mesh: &LiveMesh, dearest: f32) -> f32 {
+        let _ = mesh;
+        dearest
+    }
+
     /// How far a collapse changes costs. Default: [`Reach::Ends`].
     fn reach(&self) -> Reach {
         Reach::Ends
@@ -164,7 +171,7 @@ pub struct Collapsed {
     pub remap: Vec<u32>,
     /// Number of edges collapsed.
     pub collapses: usize,
-    /// The highest cost paid, in the cost's unit; 0 where nothing was collapsed.
+    /// The highest cost paid or, where the cost measures the whole ([`Cost::total`]), that; in its unit; 0 where nothing was collapsed.
     pub max_cost: f32,
 }
 

@@ -12,22 +12,20 @@
 //!
 //! Every dead vertex is kept, under the triangle that covers it, and looked at again whenever that triangle changes: e_app is what the
 //! formula says of all of them, never a sum of estimates. Between vertices, and where a triangle's attributes hardly vary, it is an
-//! estimate; only e_geo is a bound.
+//! estimate; only of e_geo a bound is measured when all is done.
 //!
 //! Traps: angles are taken from sine and cosine, so that rounding over 1 does no harm. On a triangle without any variation kappa_1 is 0
 //! and no other place looks otherwise: what differs there costs infinity, what does not differ nothing. Differences of less than
 //! half a grey level of Lambert's shading, 1/510, do not count.
 
 use farfield_core::Fault;
-use farfield_core::bvh::nearest_on_triangle;
-use farfield_core::collapse::{Cost, LiveMesh};
+use farfield_core::collapse::Cost;
 use farfield_core::strategy::{MeshView, SimplificationMetric, VertexSeen};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::hausdorff::{Deviation, Patch, weights};
-use crate::star::ROUNDING;
+use crate::deviation::{Deviation, Foot};
 
 /// A difference of attributes that nobody sees: radians of a normal, since |d cos| <= |d angle|, and parts of white of an albedo.
 const LEAST: f32 = 0.5 / 255.0;
@@ -53,7 +51,8 @@ impl SimplificationMetric for Appearance {
             let cause = format!("{n} normals and {a} albedos for {p} positions");
             return Err(Fault::Data { place: "appearance".into(), cause });
         }
-        Ok((Box::new(Deviation::new(&mesh, px, Some(Looks::new(&mesh)), max_px)), max_px))
+        let looks = Looks { normals: mesh.normals, albedo: mesh.albedo };
+        Ok((Box::new(Deviation::new(mesh, px, Some(looks), max_px)), max_px))
     }
 
     fn bounds_distance(&self) -> bool {
@@ -61,104 +60,16 @@ impl SimplificationMetric for Appearance {
     }
 }
 
-/// The looks of vertices, the dead ones' under the triangles that cover them.
+/// What vertices look like.
 pub(crate) struct Looks<'a> {
     normals: &'a [Vec3],
     albedo: &'a [[u8; 4]],
-    positions: &'a [Vec3],
-    /// For each triangle the dead vertices that it covers.
-    under: Vec<Vec<u32>>,
-    /// Scratch: what a patch covers.
-    all: Vec<u32>,
 }
 
-impl<'a> Looks<'a> {
-    fn new(mesh: &MeshView<'a>) -> Self {
-        Self {
-            normals: mesh.normals,
-            albedo: mesh.albedo,
-            positions: mesh.positions,
-            under: vec![vec![]; mesh.indices.len() / 3],
-            all: vec![],
-        }
-    }
-
-    /// The largest distance to the same looks over what the patch covers once `from` went onto `onto`, scene units; infinite above `limit`.
-    pub(crate) fn off(&mut self, mesh: &LiveMesh, patch: &Patch, from: u32, onto: u32, limit: f32) -> f32 {
-        self.cover(patch, from);
-        let mut most = 0f32;
-        for i in 0..self.all.len() {
-            let v = self.all[i];
-            if let Some((_, distance)) = self.foot(mesh, patch, onto, v) {
-                most = most.max(distance);
-            }
-            if most > limit {
-                return f32::INFINITY;
-            }
-        }
-        most
-    }
-
-    /// `from` dies: what the patch covered lies under its new triangles.
-    pub(crate) fn collapsed(&mut self, mesh: &LiveMesh, patch: &Patch, from: u32, onto: u32) {
-        self.cover(patch, from);
-        patch.gone.iter().chain(patch.moved.iter().map(|m| &m.0)).for_each(|&t| self.under[t as usize].clear());
-        for i in 0..self.all.len() {
-            let v = self.all[i];
-            if let Some((triangle, _)) = self.foot(mesh, patch, onto, v) {
-                self.under[triangle as usize].push(v);
-            } else if let Some(&t) = mesh.triangles_of(onto).iter().find(|t| !patch.gone.contains(t)) {
-                self.under[t as usize].push(v);
-            }
-        }
-    }
-
-    fn cover(&mut self, patch: &Patch, from: u32) {
-        self.all.clear();
-        self.all.push(from);
-        for &t in patch.gone.iter().chain(patch.moved.iter().map(|m| &m.0)) {
-            self.all.extend_from_slice(&self.under[t as usize]);
-        }
-    }
-
-    /// The new triangle that covers a dead vertex, with how far the vertex's looks are there: along the patch's normal, where several do, on
-    /// an edge, the one whose looks are nearest, so that rounding does not choose; where none does, the nearest triangle. `None` where no triangle
-    /// moves.
-    fn foot(&self, mesh: &LiveMesh, patch: &Patch, onto: u32, v: u32) -> Option<(u32, f32)> {
-        let (at, q) = (self.positions[v as usize], mesh.position(onto));
-        let mut best: Option<(u32, f32)> = None;
-        let foot = |triangle, [x, y]: [u32; 2], weights| Foot { triangle, corners: [onto, x, y], weights };
-        if patch.normal != Vec3::ZERO {
-            let (across, up) = patch.normal.any_orthonormal_pair();
-            let flat = |v: Vec3| Vec2::new((v - q).dot(across), (v - q).dot(up));
-            for &(t, pair) in &patch.moved {
-                let [a, b] = pair.map(|v| flat(mesh.position(v)));
-                let [u, w] = weights([Vec2::ZERO, a, b], flat(at));
-                if u.min(w).min(1.0 - u - w) >= -ROUNDING {
-                    let distance = self.distance(mesh, v, &foot(t, pair, [1.0 - u - w, u, w]));
-                    if best.is_none_or(|b| distance < b.1) {
-                        best = Some((t, distance));
-                    }
-                }
-            }
-        }
-        best.or_else(|| {
-            let mut nearest: Option<(f64, Foot)> = None;
-            for &(t, pair) in &patch.moved {
-                let [a, b] = pair.map(|v| mesh.position(v));
-                let (point, w) = nearest_on_triangle(at.as_dvec3(), [q, a, b].map(|v| v.as_dvec3()));
-                let d = point.distance_squared(at.as_dvec3());
-                if nearest.is_none_or(|n| d < n.0) {
-                    nearest = Some((d, foot(t, pair, w.map(|w| w as f32))));
-                }
-            }
-            nearest.map(|n| (n.1.triangle, self.distance(mesh, v, &n.1)))
-        })
-    }
-
-    /// How far the looks of a dead vertex are from its foot.
-    fn distance(&self, mesh: &LiveMesh, v: u32, &Foot { corners, weights: w, .. }: &Foot) -> f32 {
-        let p = corners.map(|c| mesh.position(c));
+impl Looks<'_> {
+    /// How far the looks of a vertex are from its foot, scene units.
+    pub(crate) fn off(&self, positions: &[Vec3], v: u32, &Foot { corners, weights: w, .. }: &Foot) -> f32 {
+        let p = corners.map(|c| positions[c as usize]);
         let n = corners.map(|c| self.normals[c as usize]);
         let between = |x: [Vec3; 3]| x[0] * w[0] + x[1] * w[1] + x[2] * w[2];
         let turn = away(angle(self.normals[v as usize], between(n).normalize_or_zero()), |i, j| angle(n[i], n[j]), &p);
@@ -193,18 +104,10 @@ fn unit(c: [u8; 4]) -> Vec3 {
     Vec3::new(f32::from(c[0]), f32::from(c[1]), f32::from(c[2])) / 255.0
 }
 
-/// Where a dead vertex lies on the new surface.
-#[derive(Clone, Copy)]
-struct Foot {
-    triangle: u32,
-    corners: [u32; 3],
-    weights: [f32; 3],
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use farfield_core::collapse::{Collapsed, Settings, collapse};
+    use farfield_core::collapse::{Collapsed, LiveMesh, Settings, collapse};
 
     /// n x n unit squares in the plane.
     fn plane(n: u32) -> (Vec<Vec3>, Vec<u32>) {
@@ -290,7 +193,8 @@ mod tests {
             let least = out.indices.chunks_exact(3).filter_map(|t| {
                 let t = [t[0], t[1], t[2]];
                 let c = t.map(|i| out.positions[i as usize]);
-                let [x, y] = weights(c.map(|c| c.truncate()), p.truncate());
+                let [a, b, q] = [c[1] - c[0], c[2] - c[0], p - c[0]].map(|v| v.truncate());
+                let [x, y] = [q.perp_dot(b), a.perp_dot(q)].map(|w| w / a.perp_dot(b));
                 if !(x >= 0.0 && y >= 0.0 && x + y <= 1.0) {
                     return None;
                 }

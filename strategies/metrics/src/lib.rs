@@ -3,11 +3,12 @@
 
 mod appearance;
 pub mod candidates;
+mod deviation;
 mod hausdorff;
+mod measured;
 mod quadric;
 mod self_occlusion;
 mod silhouette_weighted;
-mod star;
 mod void_surface;
 
 pub use appearance::Appearance;

@@ -1,0 +1,321 @@
+//! What `hausdorff` and `appearance` price edges by: how far the original vertices lie from what the collapse would leave.
+//!
+//! Every dead vertex is kept under the triangle that covers it and looked at again whenever that triangle changes, so that prices are
+//! distances from the original, never sums of steps: what one collapse moves up and the next one down costs the larger of the two. Between vertices
+//! a price is an estimate; at the end [`two_sided`] measures a bound of the whole.
+//!
+//! A patch, the triangles that a collapse moves, is projected onto the plane across the sum of the old triangles' areas; a vertex lies
+//! under the new triangle that covers it there. Where the projection folds, or nothing covers it (a border that moved), it lies under
+//! the nearest triangle. O(vertices under the patch) a price.
+
+use farfield_core::bvh::nearest_on_triangle;
+use farfield_core::collapse::{Candidate, Cost, LiveMesh, Place, Reach};
+use farfield_core::strategy::MeshView;
+use glam::{Vec2, Vec3};
+
+use crate::appearance::Looks;
+use crate::measured::two_sided;
+
+/// How far parts of an edge or of a triangle may lie outside it after rounding.
+const ROUNDING: f32 = 1e-4;
+/// No vertex.
+const NONE: u32 = u32::MAX;
+
+/// The distance of the original vertices from the surface that is left, in pixels, with what they look like where that counts.
+pub(crate) struct Deviation<'a> {
+    px: &'a (dyn Fn(Vec3, Vec3) -> f32 + Sync),
+    /// Costs above it are as good as infinite.
+    most: f32,
+    mesh: MeshView<'a>,
+    looks: Option<Looks<'a>>,
+    under: Under,
+    patch: Patch,
+}
+
+/// For each triangle the dead vertices that it covers: lists through the vertices.
+struct Under {
+    first: Vec<u32>,
+    next: Vec<u32>,
+}
+
+/// What a collapse moves.
+#[derive(Default)]
+struct Patch {
+    /// Triangles that vanish.
+    gone: Vec<u32>,
+    /// Those that stay, with their new corners: the survivor first.
+    moved: Vec<Moved>,
+    /// Unit normal of the plane that all is projected onto; zero where that folds it.
+    normal: Vec3,
+    across: Vec3,
+    up: Vec3,
+    /// The survivor's position.
+    onto: Vec3,
+    /// Neighbours that the dying vertex had beside the survivor, projected, with their heights.
+    spokes: Vec<(Vec2, f32)>,
+    /// The original vertices that lie under it after the collapse.
+    covered: Vec<u32>,
+}
+
+/// A triangle after the collapse, from the survivor.
+#[derive(Clone, Copy)]
+struct Moved {
+    triangle: u32,
+    corners: [u32; 3],
+    /// Projected, from the survivor.
+    a: Vec2,
+    b: Vec2,
+    /// Heights over the survivor.
+    heights: [f32; 2],
+    /// The cosine of its tilt against the plane: of a height over it, what is distance.
+    upright: f32,
+}
+
+/// Where a vertex lies on the new surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Foot {
+    /// Of the patch's.
+    moved: usize,
+    /// The triangle's corners and the weights of them.
+    pub(crate) corners: [u32; 3],
+    pub(crate) weights: [f32; 3],
+    /// Distance, scene units.
+    off: f32,
+}
+
+impl<'a> Deviation<'a> {
+    /// `most` is the cost above which nothing is collapsed.
+    pub(crate) fn new(
+        mesh: MeshView<'a>,
+        px: &'a (dyn Fn(Vec3, Vec3) -> f32 + Sync),
+        looks: Option<Looks<'a>>,
+        most: f32,
+    ) -> Self {
+        let under = Under { first: vec![NONE; mesh.indices.len() / 3], next: vec![NONE; mesh.positions.len()] };
+        Self { px, most, mesh, looks, under, patch: Patch::default() }
+    }
+
+    /// The most pixels that a length takes at a place.
+    fn pixels(&self, p: Vec3, length: f32) -> f32 {
+        Vec3::AXES.iter().map(|&x| (self.px)(p, p + x * length)).fold(0.0, f32::max)
+    }
+
+    /// The cost of `from` going onto `onto`, pixels.
+    fn price(&mut self, mesh: &LiveMesh, from: u32, onto: u32) -> f32 {
+        let p = mesh.position(from);
+        let length = p.distance(mesh.position(onto));
+        let scale = if length > 0.0 { self.pixels(p, length) / length } else { 0.0 };
+        if !self.patch.gather(mesh, from, onto) {
+            return f32::INFINITY;
+        }
+        let limit = if scale > 0.0 { self.most / scale } else { f32::INFINITY };
+        // Where nothing projects, its triangles follow the dying vertex: no point moves farther than it does.
+        let mut most = if self.patch.normal == Vec3::ZERO { length } else { 0.0 };
+        if most > limit {
+            return f32::INFINITY;
+        }
+        if self.patch.normal != Vec3::ZERO {
+            most = self.patch.crossed(p);
+            if most > limit {
+                return f32::INFINITY;
+            }
+        }
+        // The dying vertex decides most often.
+        let mut off = |v: u32| {
+            let foot = self.patch.foot(mesh, self.mesh.positions, self.looks.as_ref(), v);
+            let off = foot.map_or(length, |(_, off)| off);
+            most = most.max(off);
+            off <= limit
+        };
+        if !off(from) {
+            return f32::INFINITY;
+        }
+        for t in self.patch.gone.iter().copied().chain(self.patch.moved.iter().map(|m| m.triangle)) {
+            let mut v = self.under.first[t as usize];
+            while v != NONE {
+                if !off(v) {
+                    return f32::INFINITY;
+                }
+                v = self.under.next[v as usize];
+            }
+        }
+        let cost = most * scale;
+        if cost.is_finite() { cost } else { f32::INFINITY }
+    }
+}
+
+impl Cost for Deviation<'_> {
+    fn costs(&mut self, mesh: &LiveMesh, edges: &[[u32; 2]], out: &mut [Candidate]) {
+        for (&[a, b], out) in edges.iter().zip(out) {
+            let mut way = |from: u32, onto: u32| {
+                if mesh.is_locked(from) { f32::INFINITY } else { self.price(mesh, from, onto) }
+            };
+            let (first, second) = (way(b, a), way(a, b));
+            *out = if first <= second {
+                Candidate { cost: first, place: Place::First }
+            } else {
+                Candidate { cost: second, place: Place::Second }
+            };
+        }
+    }
+
+    fn collapsed(&mut self, mesh: &LiveMesh, from: u32, onto: u32, _at: Vec3) {
+        self.patch.gather(mesh, from, onto);
+        let Self { patch, under, .. } = self;
+        let mut covered = std::mem::take(&mut patch.covered);
+        covered.clear();
+        covered.push(from);
+        for t in patch.gone.iter().copied().chain(patch.moved.iter().map(|m| m.triangle)) {
+            let mut v = std::mem::replace(&mut under.first[t as usize], NONE);
+            while v != NONE {
+                covered.push(v);
+                v = under.next[v as usize];
+            }
+        }
+        for &v in &covered {
+            let foot = patch.foot(mesh, self.mesh.positions, self.looks.as_ref(), v);
+            let other = || mesh.triangles_of(onto).iter().copied().find(|t| !patch.gone.contains(t));
+            if let Some(t) = foot.map(|(f, _)| patch.moved[f.moved].triangle).or_else(other) {
+                under.next[v as usize] = std::mem::replace(&mut under.first[t as usize], v);
+            }
+        }
+        patch.covered = covered;
+    }
+
+    /// A bound of the two-sided distance, where that is more than what the vertices gave.
+    fn total(&mut self, mesh: &LiveMesh, dearest: f32) -> f32 {
+        let length = |t: u32| mesh.position(mesh.corners(t)[0]).distance(mesh.position(mesh.corners(t)[1]));
+        let scale = |t: u32| self.pixels(mesh.position(mesh.corners(t)[0]), length(t)) / length(t);
+        let living = || (0..mesh.all_triangles() as u32).filter(|&t| mesh.is_alive(t));
+        // How fine is measured goes by what was paid, at the most pixels a length.
+        let scale = living().map(scale).filter(|s| s.is_finite()).fold(0.0, f32::max);
+        let fine = if scale > 0.0 { dearest / scale } else { 0.0 };
+        let off = two_sided(mesh, self.mesh.positions, self.mesh.indices, fine);
+        living()
+            .filter(|&t| off[t as usize] > 0.0)
+            .map(|t| mesh.corners(t).map(|v| self.pixels(mesh.position(v), off[t as usize])).into_iter().fold(0.0, f32::max))
+            .fold(dearest, f32::max)
+    }
+
+    fn reach(&self) -> Reach {
+        Reach::Ring
+    }
+}
+
+impl Patch {
+    /// Whether what vanishes stays on the surface, as an edge.
+    fn gather(&mut self, mesh: &LiveMesh, from: u32, onto: u32) -> bool {
+        self.gone.clear();
+        self.moved.clear();
+        (self.onto, self.normal) = (mesh.position(onto), Vec3::ZERO);
+        let p = mesh.position(from);
+        let mut sum = Vec3::ZERO;
+        for &t in mesh.triangles_of(from) {
+            let c = mesh.corners(t);
+            let k = usize::from(c[1] == from) + 2 * usize::from(c[2] == from);
+            let [x, y] = [c[(k + 1) % 3], c[(k + 2) % 3]];
+            sum += (mesh.position(x) - p).cross(mesh.position(y) - p);
+            if x == onto || y == onto {
+                self.gone.push(t);
+            } else {
+                let (a, b, heights) = (Vec2::ZERO, Vec2::ZERO, [0.0; 2]);
+                self.moved.push(Moved { triangle: t, corners: [onto, x, y], a, b, heights, upright: 1.0 });
+            }
+        }
+        // A triangle that vanishes becomes an edge: one that nobody else has would be no surface.
+        let third = |t: u32| mesh.corners(t).into_iter().find(|&v| v != from && v != onto);
+        let whole = self.gone.iter().all(|&t| {
+            let Some(x) = third(t) else { return false };
+            let stays = |&o: &u32| mesh.corners(o).contains(&x) && !self.gone.contains(&o);
+            mesh.triangles_of(onto).iter().any(stays) || mesh.triangles_of(from).iter().any(stays)
+        });
+        if whole && let Some(normal) = sum.try_normalize() {
+            self.project(mesh, normal);
+        }
+        whole
+    }
+
+    /// Onto the plane across a normal, if no new triangle folds over.
+    fn project(&mut self, mesh: &LiveMesh, normal: Vec3) {
+        (self.across, self.up) = normal.any_orthonormal_pair();
+        for m in &mut self.moved {
+            let [a, b] = [m.corners[1], m.corners[2]].map(|v| mesh.position(v) - self.onto);
+            (m.a, m.b) = (Vec2::new(a.dot(self.across), a.dot(self.up)), Vec2::new(b.dot(self.across), b.dot(self.up)));
+            m.heights = [a.dot(normal), b.dot(normal)];
+            let (flat, area) = (m.a.perp_dot(m.b), a.cross(b).length());
+            // Written so that NaN folds.
+            if !(flat > 0.0 && area > 0.0) {
+                return;
+            }
+            m.upright = (flat / area).min(1.0);
+        }
+        self.normal = normal;
+        self.spokes.clear();
+        for m in &self.moved {
+            self.spokes.push((m.a, m.heights[0]));
+            if self.moved.iter().all(|o| o.corners[1] != m.corners[2]) {
+                self.spokes.push((m.b, m.heights[1]));
+            }
+        }
+    }
+
+    /// The largest distance of edges that go from edges that take their place, where they cross, scene units: no vertex need lie between
+    /// a sliver's long edge and the surface.
+    fn crossed(&self, from: Vec3) -> f32 {
+        let from = from - self.onto;
+        let (flat, height) = (Vec2::new(from.dot(self.across), from.dot(self.up)), from.dot(self.normal));
+        let mut most = 0f32;
+        for &(x, hx) in &self.spokes {
+            let d = x - flat;
+            for &(y, hy) in &self.spokes {
+                // flat + s d = t y
+                let area = d.perp_dot(y);
+                let (s, t) = (-flat.perp_dot(y) / area, -flat.perp_dot(d) / area);
+                if s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0 {
+                    most = most.max((height + s * (hx - height) - t * hy).abs());
+                }
+            }
+        }
+        most
+    }
+
+    /// Where a vertex lies on the new surface, and how far it and its looks are off there, scene units. Of several triangles, on an edge, the one
+    /// that is nearest, so that rounding does not choose. `None` where no triangle moves.
+    fn foot(&self, mesh: &LiveMesh, positions: &[Vec3], looks: Option<&Looks<'_>>, v: u32) -> Option<(Foot, f32)> {
+        let at = positions[v as usize];
+        let off = |f: &Foot| looks.map_or(f.off, |l| f.off.hypot(l.off(positions, v, f)));
+        let mut best: Option<(Foot, f32)> = None;
+        if self.normal != Vec3::ZERO {
+            let from = at - self.onto;
+            let (flat, height) = (Vec2::new(from.dot(self.across), from.dot(self.up)), from.dot(self.normal));
+            for (i, m) in self.moved.iter().enumerate() {
+                let area = m.a.perp_dot(m.b);
+                let (u, w) = (flat.perp_dot(m.b) / area, m.a.perp_dot(flat) / area);
+                if u.min(w).min(1.0 - u - w) >= -ROUNDING {
+                    let over = height - (u * m.heights[0] + w * m.heights[1]);
+                    let foot = Foot {
+                        moved: i,
+                        corners: m.corners,
+                        weights: [1.0 - u - w, u, w],
+                        off: over.abs() * m.upright,
+                    };
+                    let off = off(&foot);
+                    if best.is_none_or(|b| off < b.1) {
+                        best = Some((foot, off));
+                    }
+                }
+            }
+        }
+        best.or_else(|| {
+            let mut nearest: Option<Foot> = None;
+            for (i, m) in self.moved.iter().enumerate() {
+                let (point, w) = nearest_on_triangle(at.as_dvec3(), m.corners.map(|c| mesh.position(c).as_dvec3()));
+                let off = point.distance(at.as_dvec3()) as f32;
+                if nearest.is_none_or(|n| off < n.off) {
+                    nearest = Some(Foot { moved: i, corners: m.corners, weights: w.map(|w| w as f32), off });
+                }
+            }
+            nearest.map(|f| (f, off(&f)))
+        })
+    }
+}
