@@ -52,6 +52,11 @@ fn main() {
         let settings = Settings { mode: Mode::Batched, max_cost, ..Settings::default() };
         let out = collapse(LiveMesh::new(&positions, &indices, &[]).expect("whole"), cost.as_mut(), &settings);
         let rate = millions / started.elapsed().as_secs_f64();
-        println!("{name} {} triangles, off by at most {:.6}, {rate:.3} Mtri/s, {:.3} of meshoptimizer's", out.indices.len() / 3, out.max_cost, rate / peer);
+        println!(
+            "{name} {} triangles, off by at most {:.6}, {rate:.3} Mtri/s, {:.3} of meshoptimizer's",
+            out.indices.len() / 3,
+            out.max_cost,
+            rate / peer
+        );
     }
 }

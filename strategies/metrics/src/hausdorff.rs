@@ -43,6 +43,7 @@ impl SimplificationMetric for Hausdorff {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::deviation::MARGIN;
     use farfield_core::bvh::TriangleBvh;
     use farfield_core::collapse::{Collapsed, LiveMesh, Mode, Settings, collapse};
     use proptest::prelude::*;
@@ -89,6 +90,7 @@ mod tests {
     fn a_flat_square_costs_nothing_with_its_border() {
         let (positions, indices) = field(12, |_, _| 0.25);
         let out = simplified(&positions, &indices, 1e-6, Settings::default());
+        eprintln!("{:?}", out.indices.iter().map(|&i| positions[i as usize]).collect::<Vec<_>>());
         assert_eq!(out.indices.len(), 6);
         assert!(out.max_cost <= 1e-6);
     }
@@ -104,10 +106,12 @@ mod tests {
             Vec3::new(1.0, 1.0, 0.75),
         ];
         let indices = [0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4];
-        assert_eq!(simplified(&positions, &indices, 0.74, Settings::default()).indices.len(), 12);
-        let out = simplified(&positions, &indices, 0.76, Settings::default());
+        // With what is added for what lies between vertices.
+        let most = 0.75 * MARGIN;
+        assert_eq!(simplified(&positions, &indices, 0.99 * most, Settings::default()).indices.len(), 12);
+        let out = simplified(&positions, &indices, 1.01 * most, Settings::default());
         assert_eq!(out.indices.len(), 6);
-        assert!((out.max_cost - 0.75).abs() < 1e-6, "{}", out.max_cost);
+        assert!((out.max_cost - most).abs() < 1e-6, "{}", out.max_cost);
     }
 
     #[test]
@@ -131,7 +135,7 @@ mod tests {
             let out =
                 collapse(LiveMesh::new(&positions, &indices, &locked).unwrap(), cost.as_mut(), &Settings::default());
             assert_eq!(out.indices.len(), 12);
-            assert!((out.max_cost - 0.2).abs() < 1e-4, "turned {i}: {}", out.max_cost);
+            assert!((out.max_cost - 0.2 * MARGIN).abs() < 1e-4, "turned {i}: {}", out.max_cost);
         }
     }
 
@@ -171,7 +175,7 @@ mod tests {
             let back = sampled(&positions, &out.indices, &indices, 12);
             prop_assert!(there.max(back) <= bound, "{there} {back} {bound}");
             // Nor is it much more than what is found.
-            prop_assert!(out.max_cost <= 1.5 * there.max(back).max(0.5 * most), "{there} {back} {}", out.max_cost);
+            prop_assert!(out.max_cost <= 2.0 * there.max(back).max(0.5 * most), "{there} {back} {}", out.max_cost);
         }
     }
 }

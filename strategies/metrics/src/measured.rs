@@ -26,7 +26,7 @@ const FINE: f32 = 0.25;
 /// How much too far a piece's bound may be.
 const SLACK: f32 = 1.1;
 /// Heights of more than so many times what is allowed are looked into.
-const STEEP: f32 = 1.25;
+const STEEP: f32 = 1.0;
 /// What may be missing of a triangle's area that counts as covered: rounding.
 const ROUNDING: f32 = 1e-3;
 
@@ -61,11 +61,16 @@ pub(crate) fn two_sided(mesh: &LiveMesh, positions: &[Vec3], original: &[u32], a
         next += pairs[next..].partition_point(|p| p[0] < o);
         let run = &pairs[next..next + pairs[next..].partition_point(|p| p[0] == o)];
         let mut keep = |t: u32, d: f32| out[t as usize] = out[t as usize].max(d);
+        let whole = Piece::new(at(corners(o)));
+        // Where it lies over none, or nearer to one that it does not lie over.
+        let mut left = vec![];
         if run.is_empty() {
-            is.pieces(Piece::new(at(corners(o))), FOLDED_DEPTH, allowed, &mut |t, d| keep(living[t as usize], d));
-        } else {
-            among(Piece::new(at(corners(o))), DEPTH, run, &|t| at(mesh.corners(t)), allowed, &mut keep);
+            left.push(whole);
         }
+        among(whole, DEPTH, run, &|t| at(mesh.corners(t)), allowed, &mut |piece, t, d| {
+            if d > STEEP * allowed { left.push(piece) } else { keep(t, d) }
+        });
+        left.into_iter().for_each(|p| is.pieces(p, FOLDED_DEPTH, allowed, &mut |t, d| keep(living[t as usize], d)));
     }
     out
 }
@@ -83,9 +88,9 @@ fn among(
     run: &[[u32; 2]],
     triangle: &dyn Fn(u32) -> [Vec3; 3],
     allowed: f32,
-    keep: &mut dyn FnMut(u32, f32),
+    keep: &mut dyn FnMut(Piece, u32, f32),
 ) {
-    if piece.count == 0 {
+    if piece.count == 0 || run.is_empty() {
         return;
     }
     // Of each corner the nearest triangle, of each triangle the farthest corner; of the middle the nearest triangle.
@@ -108,7 +113,7 @@ fn among(
     }
     let (far, t) = best;
     if depth == 0 || far <= FINE * allowed || far <= SLACK * near[..piece.count].iter().copied().fold(0.0, f32::max) {
-        return keep(t, far);
+        return keep(piece, t, far);
     }
     let (outside, inside) = piece.split(triangle(host.1));
     outside.into_iter().for_each(|p| among(p, depth - 1, run, triangle, allowed, keep));
