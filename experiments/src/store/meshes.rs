@@ -1,10 +1,14 @@
-//! Payloads as the store keeps them: meshes through meshoptimizer's codecs (Kapoulkine; indices by the order of vertices, vertices byte by
-//! byte as differences), everything else as it is.
+//! Payloads as the store keeps them: triangles through meshoptimizer's index codec (Kapoulkine), vertices as what a prediction leaves, everything
+//! else as it is.
 //!
 //! Lossless, and no strategy has to know of it: positions on a grid (whole multiples of a power of two) are kept as whole
 //! numbers, normals that are some octahedral code's vector as that code, albedo that is the same all over once; what is on no grid
 //! is kept as floats. Triangles are put in an order that their neighbours' vertices profit from, each counter-clockwise as before; vertices in the order of
 //! their first use, those that no triangle uses go.
+//!
+//! A position is predicted by the parallelogram that the triangle across its edge spans (Touma and Gotsman, *Triangle mesh compression*,
+//! 1998), a normal by the triangles round its vertex. Where most positions are on a coarser grid than the rest, as in a node whose border
+//! is finer than its inside, these are kept as numbers of that grid. Differences are kept byte by byte, each byte through zstd's Huffman coder.
 
 use farfield_core::Fault;
 use farfield_core::octahedral;
@@ -28,19 +32,26 @@ struct Packed {
 #[derive(Debug, Serialize, Deserialize)]
 enum Positions {
     Floats(Vec<u8>),
-    /// (base + number) * 2^exponent.
+    /// Whole numbers times 2^exponent.
     Grid {
         exponent: i16,
-        base: [i32; 3],
-        wide: bool,
-        bytes: Vec<u8>,
+        /// Of so many bits the last ones are 0 where `coarse` says so, a bit a vertex; where it is empty, everywhere.
+        zeros: u8,
+        coarse: Vec<u8>,
+        /// Differences from the prediction.
+        off: Vec<Vec<u8>>,
+        off_fine: Vec<Vec<u8>>,
     },
 }
 
 #[derive(Debug, Serialize, Deserialize)]
 enum Normals {
     Floats(Vec<u8>),
-    Codes(Vec<u8>),
+    /// Of so many bits a coordinate; differences from the prediction.
+    Codes {
+        bits: u8,
+        off: Vec<Vec<u8>>,
+    },
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -121,12 +132,15 @@ fn packed_mesh(m: &MeshPart) -> Result<Packed, Fault> {
     let positions: Vec<Vec3> = order.iter().map(|&i| m.positions[i]).collect();
     let normals: Vec<Vec3> = order.iter().map(|&i| m.normals[i]).collect();
     let albedo: Vec<[u8; 4]> = order.iter().map(|&i| m.albedo[i]).collect();
+    let coded_indices = coded(meshopt::encode_index_buffer(&indices, vertices))?;
+    // The codec turns triangles: predictions go by what comes back.
+    let indices: Vec<u32> = coded(meshopt::decode_index_buffer(&coded_indices, indices.len()))?;
     Ok(Packed {
         vertices: vertices as u32,
         triangles: (indices.len() / 3) as u32,
-        indices: coded(meshopt::encode_index_buffer(&indices, vertices))?,
-        positions: pack_positions(&positions)?,
-        normals: pack_normals(&normals)?,
+        positions: pack_positions(&positions, &indices)?,
+        normals: pack_normals(&normals, &positions, &indices)?,
+        indices: coded_indices,
         albedo: match albedo.first() {
             Some(&first) if albedo.iter().all(|a| *a == first) => Albedo::One(first),
             _ => Albedo::Many(coded(meshopt::encode_vertex_buffer(&albedo))?),
@@ -136,38 +150,150 @@ fn packed_mesh(m: &MeshPart) -> Result<Packed, Fault> {
 
 fn unpacked_mesh(p: &Packed) -> Result<MeshPart, Fault> {
     let n = p.vertices as usize;
+    let indices: Vec<u32> = coded(meshopt::decode_index_buffer(&p.indices, 3 * p.triangles as usize))?;
+    // By their first use, so that none is asked for before it is there.
+    let mut next = 0;
+    for &i in &indices {
+        if i > next || i as usize >= n {
+            return Err(damaged("an index without a vertex"));
+        }
+        next = next.max(i + 1);
+    }
+    if next as usize != n {
+        return Err(damaged("a vertex without a triangle"));
+    }
     let floats = |bytes: &[u8]| -> Result<Vec<Vec3>, Fault> {
         Ok(coded(meshopt::decode_vertex_buffer::<[f32; 3]>(bytes, n))?.into_iter().map(Vec3::from).collect())
     };
     let positions = match &p.positions {
         Positions::Floats(bytes) => floats(bytes)?,
-        Positions::Grid { exponent, base, wide, bytes } => {
+        Positions::Grid { exponent, zeros, coarse, off, off_fine } => {
             let step = f32::from(*exponent).exp2();
-            let at = |v: [u32; 3]| (IVec3::from(*base) + glam::UVec3::from(v).as_ivec3()).as_vec3() * step;
-            if *wide {
-                coded(meshopt::decode_vertex_buffer::<[u32; 3]>(bytes, n))?.into_iter().map(at).collect()
-            } else {
-                let narrow = coded(meshopt::decode_vertex_buffer::<[u16; 4]>(bytes, n))?;
-                narrow.into_iter().map(|v| at([v[0], v[1], v[2]].map(u32::from))).collect()
+            if *zeros > 31 || !(coarse.is_empty() || coarse.len() == n.div_ceil(8)) {
+                return Err(damaged("its grid"));
             }
+            let is_coarse = |v: usize| coarse.is_empty() || coarse[v / 8] >> (v % 8) & 1 != 0;
+            let of_coarse = (0..n).filter(|&v| is_coarse(v)).count();
+            let mut off = whole(off, 3 * of_coarse)?.into_iter();
+            let mut off_fine = whole(off_fine, 3 * (n - of_coarse))?.into_iter();
+            let mut out: Vec<IVec3> = vec![IVec3::ZERO; n];
+            predict(&indices, &mut out, &mut |v, guess, _| {
+                let (zeros, off) = if is_coarse(v) { (*zeros, &mut off) } else { (0, &mut off_fine) };
+                let mut next = || off.next().unwrap_or_default();
+                let off = IVec3::new(next(), next(), next());
+                rounded_down(guess, zeros).wrapping_add(off) << IVec3::splat(zeros.into())
+            });
+            out.into_iter().map(|v| v.as_vec3() * step).collect()
         }
     };
     let normals = match &p.normals {
         Normals::Floats(bytes) => floats(bytes)?,
-        Normals::Codes(bytes) => {
-            let codes = coded(meshopt::decode_vertex_buffer::<[i16; 2]>(bytes, n))?;
-            codes.into_iter().map(|c| octahedral::vector(c, octahedral::FINE_BITS)).collect()
+        Normals::Codes { bits, off } => {
+            if !(2..=16).contains(bits) {
+                return Err(damaged("its normals"));
+            }
+            let (bits, off) = (u32::from(*bits), whole(off, 2 * n)?);
+            let guesses = normals_of(&positions, &indices);
+            let code = |(guess, off): (&Vec3, &[i32])| {
+                let [x, y] = octahedral::code(*guess, bits);
+                octahedral::vector([x.wrapping_add(off[0] as i16), y.wrapping_add(off[1] as i16)], bits)
+            };
+            guesses.iter().zip(off.chunks_exact(2)).map(code).collect()
         }
     };
     let albedo = match &p.albedo {
         Albedo::One(a) => vec![*a; n],
         Albedo::Many(bytes) => coded(meshopt::decode_vertex_buffer(bytes, n))?,
     };
-    let indices: Vec<u32> = coded(meshopt::decode_index_buffer(&p.indices, 3 * p.triangles as usize))?;
-    if indices.iter().any(|&i| i as usize >= n) {
-        return Err(Fault::Data { place: "mesh in the store".into(), cause: "an index without a vertex".into() });
-    }
     Ok(MeshPart { positions, normals, albedo, indices, two_sided: false })
+}
+
+fn damaged(what: &str) -> Fault {
+    Fault::Data { place: "mesh in the store".into(), cause: what.into() }
+}
+
+/// Triangles whose edges are remembered.
+const RECENT: usize = 32;
+
+/// Asks for the vertices in the order of their first use, each with a guess from those before it: the fourth corner of the parallelogram over the
+/// triangle across its edge where one of the last few is that, else the vertex before.
+fn predict(indices: &[u32], at: &mut [IVec3], next: &mut dyn FnMut(usize, IVec3, IVec3) -> IVec3) {
+    let mut recent = [[u32::MAX; 3]; RECENT];
+    let mut known = 0u32;
+    for (i, t) in indices.chunks_exact(3).enumerate() {
+        for k in 0..3 {
+            let (v, a, b) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
+            if v < known {
+                continue;
+            }
+            let mut guess = known.checked_sub(1).map_or(IVec3::ZERO, |v| at[v as usize]);
+            if a < known && b < known {
+                // Across the edge from a to b the triangle that runs from b to a, the last one first.
+                let across = (1..=RECENT.min(i)).find_map(|back| {
+                    let r = recent[(i - back) % RECENT];
+                    (0..3).find(|&j| r[j] == b && r[(j + 1) % 3] == a).map(|j| r[(j + 2) % 3])
+                });
+                guess = at[a as usize];
+                if let Some(d) = across {
+                    guess = guess.wrapping_add(at[b as usize]).wrapping_sub(at[d as usize]);
+                }
+            } else if a < known {
+                guess = at[a as usize];
+            } else if b < known {
+                guess = at[b as usize];
+            }
+            at[v as usize] = next(v as usize, guess, at[v as usize]);
+            known = v + 1;
+        }
+        recent[i % RECENT] = [t[0], t[1], t[2]];
+    }
+}
+
+/// A guess in steps of 2^zeros, the nearest.
+fn rounded_down(guess: IVec3, zeros: u8) -> IVec3 {
+    if zeros == 0 { guess } else { guess.wrapping_add(IVec3::splat(1 << (zeros - 1))) >> IVec3::splat(zeros.into()) }
+}
+
+/// Normals as the triangles have them, weighted by area; zero where there is none.
+fn normals_of(positions: &[Vec3], indices: &[u32]) -> Vec<Vec3> {
+    let mut out = vec![Vec3::ZERO; positions.len()];
+    for t in indices.chunks_exact(3) {
+        let [a, b, c] = [t[0], t[1], t[2]].map(|i| positions[i as usize]);
+        let area = (b - a).cross(c - a);
+        t.iter().for_each(|&v| out[v as usize] += area);
+    }
+    out
+}
+
+/// Whole numbers, small ones mostly: their bytes, the lowest of all first, each coded apart; without the highest where those are 0.
+fn bytes_of(numbers: &[i32]) -> Result<Vec<Vec<u8>>, Fault> {
+    let folded: Vec<u32> = numbers.iter().map(|&v| (v << 1 ^ v >> 31) as u32).collect();
+    let bits = 32 - folded.iter().fold(0, |a, b| a | b).leading_zeros();
+    (0..bits.div_ceil(8))
+        .map(|k| {
+            let plane: Vec<u8> = folded.iter().map(|v| (v >> (8 * k)) as u8).collect();
+            zstd::bulk::compress(&plane, PLANES).map_err(|e| damaged(&e.to_string()))
+        })
+        .collect()
+}
+
+/// zstd's level for single bytes: there is hardly a match to be found, the Huffman coder does the work.
+const PLANES: i32 = 1;
+
+/// Back from [`bytes_of`].
+fn whole(planes: &[Vec<u8>], count: usize) -> Result<Vec<i32>, Fault> {
+    let mut folded = vec![0u32; count];
+    if planes.len() > 4 {
+        return Err(damaged("numbers of more than 32 bits"));
+    }
+    for (k, plane) in planes.iter().enumerate() {
+        let plane = zstd::bulk::decompress(plane, count).map_err(|e| damaged(&e.to_string()))?;
+        if plane.len() != count {
+            return Err(damaged(&format!("{} numbers for {count}", plane.len())));
+        }
+        folded.iter_mut().zip(plane).for_each(|(v, byte)| *v |= u32::from(byte) << (8 * k));
+    }
+    Ok(folded.into_iter().map(|v| (v >> 1) as i32 ^ -((v & 1) as i32)).collect())
 }
 
 /// The exponent of the largest power of two that a finite number is a multiple of; `None` for 0, which is one of all.
@@ -181,7 +307,7 @@ fn exponent(v: f32) -> Option<i32> {
     }
 }
 
-fn pack_positions(positions: &[Vec3]) -> Result<Positions, Fault> {
+fn pack_positions(positions: &[Vec3], indices: &[u32]) -> Result<Positions, Fault> {
     let floats = || {
         let raw: Vec<[f32; 3]> = positions.iter().map(|p| p.to_array()).collect();
         Ok(Positions::Floats(coded(meshopt::encode_vertex_buffer(&raw))?))
@@ -197,31 +323,43 @@ fn pack_positions(positions: &[Vec3]) -> Result<Positions, Fault> {
     if step == 0.0 || all().any(|v| (v / step).abs() >= (1 << 24) as f32) {
         return floats();
     }
-    let whole: Vec<IVec3> = positions.iter().map(|p| (*p / step).as_ivec3()).collect();
-    let base = whole.iter().copied().reduce(IVec3::min).unwrap_or_default();
-    let wide = whole.iter().any(|w| (*w - base).max_element() > i32::from(u16::MAX));
-    let bytes = if wide {
-        let v: Vec<[u32; 3]> = whole.iter().map(|w| (*w - base).as_uvec3().to_array()).collect();
-        coded(meshopt::encode_vertex_buffer(&v))?
-    } else {
-        let narrow = |w: &IVec3| (*w - base).as_u16vec3();
-        let v: Vec<[u16; 4]> = whole.iter().map(|w| narrow(w).extend(0).to_array()).collect();
-        coded(meshopt::encode_vertex_buffer(&v))?
-    };
-    Ok(Positions::Grid { exponent: exponent as i16, base: base.to_array(), wide, bytes })
+    let mut whole: Vec<IVec3> = positions.iter().map(|p| (*p / step).as_ivec3()).collect();
+    let zeros_of = |v: &IVec3| (v.x | v.y | v.z).trailing_zeros().min(24);
+    let mut with = [0usize; 25];
+    whole.iter().for_each(|v| (0..=zeros_of(v)).for_each(|z| with[z as usize] += 1));
+    let zeros = (0..25).max_by_key(|&z| (3 * z * with[z], std::cmp::Reverse(z))).unwrap_or(0) as u8;
+    let coarse: Vec<bool> = whole.iter().map(|v| zeros_of(v) >= zeros.into()).collect();
+    let (mut off, mut off_fine) = (vec![], vec![]);
+    predict(indices, &mut whole, &mut |v, guess, own| {
+        let (zeros, off) = if coarse[v] { (zeros, &mut off) } else { (0, &mut off_fine) };
+        off.extend(((own >> IVec3::splat(zeros.into())).wrapping_sub(rounded_down(guess, zeros))).to_array());
+        own
+    });
+    let mut bits = vec![];
+    if !coarse.iter().all(|&c| c) {
+        let byte = |run: &[bool]| run.iter().enumerate().fold(0, |b, (k, &c)| b | u8::from(c) << k);
+        bits = coarse.chunks(8).map(byte).collect();
+    }
+    let (off, off_fine) = (bytes_of(&off)?, bytes_of(&off_fine)?);
+    Ok(Positions::Grid { exponent: exponent as i16, zeros, coarse: bits, off, off_fine })
 }
 
-fn pack_normals(normals: &[Vec3]) -> Result<Normals, Fault> {
-    let bits = octahedral::FINE_BITS;
-    let codes: Vec<[i16; 2]> = normals.iter().map(|n| octahedral::code(*n, bits)).collect();
-    let same = |(n, c): (&Vec3, &[i16; 2])| {
-        octahedral::vector(*c, bits).to_array().map(f32::to_bits) == n.to_array().map(f32::to_bits)
+fn pack_normals(normals: &[Vec3], positions: &[Vec3], indices: &[u32]) -> Result<Normals, Fault> {
+    let raw = || -> Vec<[f32; 3]> { normals.iter().map(|n| n.to_array()).collect() };
+    let bits_of = |bits: u32| {
+        let same =
+            |n: &Vec3| octahedral::rounded(*n, bits).to_array().map(f32::to_bits) == n.to_array().map(f32::to_bits);
+        normals.iter().all(same)
     };
-    if normals.iter().zip(&codes).all(same) {
-        return Ok(Normals::Codes(coded(meshopt::encode_vertex_buffer(&codes))?));
+    let Some(bits) = (8..=octahedral::FINE_BITS).find(|&b| bits_of(b)) else {
+        return Ok(Normals::Floats(coded(meshopt::encode_vertex_buffer(&raw()))?));
+    };
+    let mut off = vec![];
+    for (n, guess) in normals.iter().zip(normals_of(positions, indices)) {
+        let ([x, y], [a, b]) = (octahedral::code(*n, bits), octahedral::code(guess, bits));
+        off.extend([i32::from(x.wrapping_sub(a)), i32::from(y.wrapping_sub(b))]);
     }
-    let raw: Vec<[f32; 3]> = normals.iter().map(|n| n.to_array()).collect();
-    Ok(Normals::Floats(coded(meshopt::encode_vertex_buffer(&raw))?))
+    Ok(Normals::Codes { bits: bits as u8, off: bytes_of(&off)? })
 }
 
 #[cfg(test)]
