@@ -1,0 +1,402 @@
+//! What `point-polygon-hlod` promises, beside independent samplers. Samples can refute a bound, not prove it.
+//!
+//! Of every node: points of the original surface of its chunks, at random by area and at vertices, with the nearest place of what the node draws, and
+//! the other way round (a splat is a sphere of its radius). And, where its metric is `appearance`, looks: for original vertices the error of the paper's formula,
+//!
+//! ```text
+//! e = min over the node's triangles t of sqrt(|v - q_t|^2 + e_app^2),   e_app = arccos(n . n_int(q_t)) / kappa_1(t)
+//! ```
+//!
+//! with q_t the place of t that is nearest to v (Guthe, Borodin, Balazs and Klein 2004, section 3.1), and the same of albedo: the least over all triangles,
+//! so that it is never more than what any choice of a place gives.
+//!
+//! On screen: pictures from random places, from within a hundredth of the model to eight times its size away, each pixel with its surface distance
+//! (`farfield_experiments::measure::surface_distances`).
+
+use std::path::Path;
+use std::sync::Arc;
+
+use farfield_core::Aabb;
+use farfield_core::bvh::{BoxBvh, nearest_on_triangle};
+use farfield_core::id::{AssetId, Block, CellId, LocalPayload, PayloadRef};
+use farfield_core::payload::{MeshPart, Part, Payload};
+use farfield_core::scene::{Gathered, Scene, gather};
+use farfield_experiments::audit::{CellAudit, Truth};
+use farfield_experiments::config::BackendName;
+use farfield_experiments::measure::{Piece, Pieces, Surface, SurfaceErrors};
+use farfield_experiments::walk::Opened;
+use farfield_far_hlod::{Promise, promises};
+use farfield_integration_tests::lab::{Lab, models};
+use glam::{DVec3, Vec3};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+const SEED: u64 = 4;
+
+/// An experiment of one pipeline over a scene.
+fn lab(scene: &str, far_field: &str) -> Lab {
+    let text = format!(
+        "[scene]\n{scene}\n[view]\nfov_y_deg = 60.0\nresolution = [160, 120]\npath = \"still\"\nframes = 1\n\
+         [[pipeline]]\nname = \"bounded\"\nfar_field = {{ type = \"point-polygon-hlod\", {far_field} }}\n"
+    );
+    Lab::new(&text, Path::new("")).unwrap()
+}
+
+fn file(folder: &Path, name: &str) -> String {
+    format!("path = \"{}\"", folder.join(name).display())
+}
+
+/// How much of what is promised was found.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    nodes: usize,
+    /// Places measured, of both surfaces.
+    places: usize,
+    /// Of these, beyond what the node promises.
+    beyond: usize,
+    /// The largest distance over what is promised: of leaves, which are off by rounding alone, and of others.
+    most: [f32; 2],
+    /// Looks sought, of the vertices that a node was made of.
+    made_of: Sought,
+    /// Looks sought, of the original's vertices.
+    original: Sought,
+}
+
+/// Looks that were sought.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sought {
+    vertices: usize,
+    /// Of these, whose looks are farther than promised.
+    beyond: usize,
+    /// The farthest over what is promised.
+    most: f32,
+}
+
+impl Found {
+    fn joined(self, o: Self) -> Self {
+        Self {
+            nodes: self.nodes + o.nodes,
+            places: self.places + o.places,
+            beyond: self.beyond + o.beyond,
+            most: [0, 1].map(|i| self.most[i].max(o.most[i])),
+            made_of: self.made_of.joined(o.made_of),
+            original: self.original.joined(o.original),
+        }
+    }
+}
+
+impl Sought {
+    fn joined(self, o: Self) -> Self {
+        Self { vertices: self.vertices + o.vertices, beyond: self.beyond + o.beyond, most: self.most.max(o.most) }
+    }
+
+    fn add(&mut self, off: f32, promised: f32) {
+        self.vertices += 1;
+        self.beyond += usize::from(off > promised);
+        self.most = self.most.max(off / promised);
+    }
+}
+
+/// Triangles with the sums of their areas.
+struct Areas {
+    triangles: Vec<[Vec3; 3]>,
+    sums: Vec<f64>,
+}
+
+impl Areas {
+    fn new(triangles: Vec<[Vec3; 3]>) -> Self {
+        let mut sum = 0.0;
+        let area = |[a, b, c]: &[Vec3; 3]| f64::from((*b - *a).cross(*c - *a).length());
+        let sums = triangles.iter().map(|t| {
+            sum += area(t);
+            sum
+        });
+        Self { sums: sums.collect(), triangles }
+    }
+
+    fn point(&self, rng: &mut impl Rng) -> Vec3 {
+        let at = rng.random_range(0.0..1.0) * self.sums.last().unwrap();
+        let [a, b, c] = self.triangles[self.sums.partition_point(|&s| s <= at).min(self.sums.len() - 1)];
+        let (s, t): (f32, f32) = (rng.random_range(0.0..1f32).sqrt(), rng.random_range(0.0..1.0));
+        a * (1.0 - s) + (b * (1.0 - t) + c * t) * s
+    }
+}
+
+fn places(origin: DVec3, m: &MeshPart) -> Vec<[Vec3; 3]> {
+    let at = |i: &u32| (origin + m.positions[*i as usize].as_dvec3()).as_vec3();
+    m.indices.chunks_exact(3).map(|t| [at(&t[0]), at(&t[1]), at(&t[2])]).collect()
+}
+
+/// A built tree.
+struct Tree<'a> {
+    scene: &'a Scene,
+    promises: Vec<Promise>,
+    payloads: Vec<Payload>,
+    pieces: Pieces,
+    /// Rounding moves no position by more.
+    grid: f32,
+    /// What a node of depth 0 may be off by.
+    allowance: f32,
+    appearance: bool,
+}
+
+impl<'a> Tree<'a> {
+    fn new(lab: &'a Lab, opened: &Opened<'_>) -> Self {
+        let scene = &*lab.prepared.scene;
+        let promises = promises(&opened.built.shared.as_ref().unwrap().1.index).unwrap();
+        let block = |i: usize| Block::Payload(PayloadRef { asset: AssetId(0), id: LocalPayload(i as u32) });
+        let payloads = (0..promises.len()).map(|i| opened.fetch(block(i)).unwrap()).collect();
+        let far = &lab.experiment.pipelines[0].resolved["far_field"];
+        Self {
+            scene,
+            payloads,
+            pieces: Pieces::new(scene).unwrap(),
+            // A leaf is off by rounding alone.
+            grid: promises.iter().map(|p| p.error).fold(f32::INFINITY, f32::min),
+            allowance: scene.bounds.size().max_element() / far["resolution"].as_f64().unwrap() as f32,
+            appearance: far["metric"]["type"] == "appearance",
+            promises,
+        }
+    }
+
+    /// Samples of every node, `samples` of each kind.
+    fn check(&self, samples: usize) -> Found {
+        let one = |i: usize| {
+            let mut rng = ChaCha8Rng::seed_from_u64(SEED + i as u64);
+            let original = gather(self.scene, self.promises[i].chunks.iter().copied(), DVec3::ZERO).unwrap();
+            let mut found = self.geometry(i, &original, samples, &mut rng);
+            if self.appearance {
+                let looks = Looks::new(&self.payloads[i], self.grid);
+                found.made_of = self.looks_of_sources(i, &looks, samples, &mut rng);
+                found.original = self.looks_of_original(i, &looks, &original, samples, &mut rng);
+            }
+            found
+        };
+        (0..self.promises.len()).into_par_iter().map(one).reduce(Found::default, Found::joined)
+    }
+
+    /// A node's children: the nodes after it, up to the next one that is not deeper.
+    fn children(&self, i: usize) -> Vec<usize> {
+        let depth = self.promises[i].depth;
+        let below = (i + 1..self.promises.len()).take_while(|&j| self.promises[j].depth > depth);
+        below.filter(|&j| self.promises[j].depth == depth + 1).collect()
+    }
+
+    fn geometry(&self, i: usize, original: &Gathered, samples: usize, rng: &mut impl Rng) -> Found {
+        let (promise, payload) = (&self.promises[i], &self.payloads[i]);
+        let origin = payload.origin;
+        let there =
+            Surface::new(payload.parts.iter().filter_map(|p| Piece::of_part(origin, p).map(Arc::new)).collect());
+        let back = self.pieces.of_chunks(promise.chunks.iter().copied());
+        let own = Areas::new(original.corners.iter().map(|&c| original.places(c)).collect());
+        let meshes = payload.parts.iter().filter_map(|p| if let Part::Mesh(m) = p { Some(m) } else { None });
+        let drawn = Areas::new(meshes.flat_map(|m| places(origin, m)).collect());
+        let points = payload.parts.iter().filter_map(|p| if let Part::Points(p) = p { Some(p) } else { None });
+        let place = |p: &Vec3| (origin + p.as_dvec3()).as_vec3();
+        let splats: Vec<(Vec3, f32)> = points.flat_map(|p| p.positions.iter().map(|c| (place(c), p.radius))).collect();
+        let mut far = vec![];
+        for _ in 0..samples {
+            let vertex = original.positions[rng.random_range(0..original.positions.len())];
+            far.extend([own.point(rng), vertex].map(|p| there.nearest(p).unwrap().distance));
+            if !drawn.triangles.is_empty() {
+                let corner = drawn.triangles[rng.random_range(0..drawn.triangles.len())][0];
+                far.extend([drawn.point(rng), corner].map(|p| back.nearest(p).unwrap().distance));
+            }
+            if !splats.is_empty() {
+                let (p, radius) = splats[rng.random_range(0..splats.len())];
+                far.push((back.nearest(p).unwrap().distance - radius).max(0.0));
+            }
+        }
+        let mut most = [0.0; 2];
+        most[usize::from(!promise.leaf)] = far.iter().fold(0f32, |m, d| d.max(m)) / promise.error;
+        let beyond = far.iter().filter(|d| **d > promise.error).count();
+        Found { nodes: 1, places: far.len(), beyond, most, ..Found::default() }
+    }
+
+    /// Of the vertices that a node was simplified from: what it was allowed beyond what those were off by. Those whose normals were smoothed first,
+    /// since all of their triangles are smaller than the node's error, are left out: what was compared with the node is not stored.
+    fn looks_of_sources(&self, i: usize, looks: &Looks, samples: usize, rng: &mut impl Rng) -> Sought {
+        let mut out = Sought::default();
+        let below = |c: usize| if self.promises[c].leaf { vec![c] } else { self.children(c) };
+        let sources: Vec<usize> = self.children(i).into_iter().flat_map(below).collect();
+        let before = sources.iter().map(|&s| self.promises[s].error).fold(0.0, f32::max);
+        let size = self.allowance * 0.5f32.powi(self.promises[i].depth.into());
+        let mut vertices: Vec<(Vec3, Vec3, [u8; 4])> = vec![];
+        for s in sources {
+            for part in &self.payloads[s].parts {
+                let Part::Mesh(m) = part else { continue };
+                let at = |v: u32| (self.payloads[s].origin + m.positions[v as usize].as_dvec3()).as_vec3();
+                let mut large = vec![false; m.positions.len()];
+                for t in m.indices.chunks_exact(3) {
+                    let p = [t[0], t[1], t[2]].map(at);
+                    if [(0, 1), (1, 2), (2, 0)].iter().any(|&(a, b)| p[a].distance(p[b]) >= size + 2.0 * self.grid) {
+                        t.iter().for_each(|&v| large[v as usize] = true);
+                    }
+                }
+                let kept = (0..m.positions.len()).filter(|&v| large[v]);
+                vertices.extend(kept.map(|v| (at(v as u32), m.normals[v], m.albedo[v])));
+            }
+        }
+        for _ in 0..if vertices.is_empty() { 0 } else { samples } {
+            let (at, normal, albedo) = vertices[rng.random_range(0..vertices.len())];
+            // Source and node are both rounded, which the difference of their errors holds once.
+            let promised = self.promises[i].error - before + self.grid;
+            out.add(looks.off(at, normal, albedo, 2.0 * self.promises[i].error, 2.0 * ROUNDED), promised);
+        }
+        out
+    }
+
+    /// Of the original's vertices: what all levels together are allowed.
+    fn looks_of_original(
+        &self,
+        i: usize,
+        looks: &Looks,
+        original: &Gathered,
+        samples: usize,
+        rng: &mut impl Rng,
+    ) -> Sought {
+        let mut out = Sought::default();
+        for _ in 0..samples {
+            let w = &original.wedges[rng.random_range(0..original.wedges.len())];
+            let at = original.positions[w.vertex as usize];
+            let e = self.promises[i].error;
+            out.add(looks.off(at, w.normal, w.albedo, 2.0 * e, ROUNDED), e);
+        }
+        out
+    }
+}
+
+/// A difference of attributes that is none, half a grey level; and what storing a normal turns it by at most.
+const LEAST: f32 = 0.5 / 255.0;
+const ROUNDED: f32 = LEAST;
+
+/// What a node looks like.
+struct Looks {
+    /// Places, normals and albedo of triangles' corners.
+    triangles: Vec<[(Vec3, Vec3, Vec3); 3]>,
+    boxes: BoxBvh,
+    grid: f32,
+}
+
+impl Looks {
+    fn new(payload: &Payload, grid: f32) -> Self {
+        let mut triangles = vec![];
+        for p in &payload.parts {
+            let Part::Mesh(m) = p else { continue };
+            let at = |i: u32| (payload.origin + m.positions[i as usize].as_dvec3()).as_vec3();
+            let corner = |i: u32| (at(i), m.normals[i as usize], unit(m.albedo[i as usize]));
+            triangles.extend(m.indices.chunks_exact(3).map(|t| [corner(t[0]), corner(t[1]), corner(t[2])]));
+        }
+        let boxes: Vec<Aabb> = triangles.iter().map(|t| Aabb::of(t.map(|c| c.0))).collect();
+        Self { triangles, boxes: BoxBvh::build(&boxes), grid }
+    }
+
+    /// The least error of the formula, of triangles within `most`. What rounding may have made of normals and places is taken off, so
+    /// that it is never too large: `rounded` is what a normal and the one that it is compared with are turned by together.
+    fn off(&self, at: Vec3, normal: Vec3, albedo: [u8; 4], most: f32, rounded: f32) -> f32 {
+        let mut least = f32::INFINITY;
+        self.boxes.around(at, most, |i, _| {
+            let t = &self.triangles[i as usize];
+            let (q, w) = nearest_on_triangle(at.as_dvec3(), t.map(|c| c.0.as_dvec3()));
+            let w = w.map(|w| w as f32);
+            let mix = |v: [Vec3; 3]| v[0] * w[0] + v[1] * w[1] + v[2] * w[2];
+            let (n, c) = (t.map(|c| c.1), t.map(|c| c.2));
+            let turned = angle(normal, mix(n).normalize_or_zero()) - rounded;
+            let other = (unit(albedo) - mix(c)).abs().max_element();
+            let length = |i: usize, j: usize| (t[i].0.distance(t[j].0) - 2.0 * self.grid).max(0.0);
+            let by_normal = away(turned, |i, j| angle(n[i], n[j]) + 2.0 * ROUNDED, length);
+            let by_albedo = away(other, |i, j| (c[i] - c[j]).abs().max_element(), length);
+            least = least.min((q.distance(at.as_dvec3()) as f32).hypot(by_normal.max(by_albedo)));
+        });
+        least
+    }
+}
+
+/// A difference over how fast it varies along a triangle's edges.
+fn away(difference: f32, along: impl Fn(usize, usize) -> f32, length: impl Fn(usize, usize) -> f32) -> f32 {
+    if difference <= LEAST {
+        return 0.0;
+    }
+    let steepest = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| along(i, j) / length(i, j)).into_iter().fold(0.0, f32::max);
+    difference / steepest
+}
+
+fn angle(a: Vec3, b: Vec3) -> f32 {
+    a.cross(b).length().atan2(a.dot(b))
+}
+
+fn unit(c: [u8; 4]) -> Vec3 {
+    Vec3::new(f32::from(c[0]), f32::from(c[1]), f32::from(c[2])) / 255.0
+}
+
+/// What pictures from random places show: all of them together, and how many had something to look at.
+fn on_screen(lab: &Lab, views: usize) -> (SurfaceErrors, usize) {
+    let opened = lab.opened(0).unwrap();
+    let mut device = lab.device(BackendName::Cpu).unwrap();
+    let scene = &*lab.prepared.scene;
+    let id = CellId(0);
+    for b in opened.payloads(id) {
+        device.load(b, scene, &|b| opened.fetch(b)).unwrap();
+    }
+    let pieces = std::cell::RefCell::new(Pieces::new(scene).unwrap());
+    let original = pieces.borrow().original();
+    let claims = opened.pipeline.far_field.frame_claims();
+    let audit = audit(lab, &opened, id, &original, &pieces, &claims);
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let (mut all, mut seen) = (SurfaceErrors::default(), 0);
+    while seen < views {
+        let sorted = audit.surface_distances(&mut *device.backend, &mut rng).unwrap().unwrap();
+        seen += usize::from(!sorted.is_empty());
+        all = all.joined(SurfaceErrors::of(&sorted, Some(claims[0].max)));
+    }
+    (all, seen)
+}
+
+fn audit<'a>(
+    lab: &'a Lab,
+    opened: &'a Opened<'_>,
+    id: CellId,
+    original: &'a Surface,
+    pieces: &'a std::cell::RefCell<Pieces>,
+    claims: &'a [farfield_core::claim::Claim],
+) -> CellAudit<'a> {
+    let draws: &'a dyn Fn(&farfield_core::Camera) -> Vec<farfield_core::draw::Draw> =
+        Box::leak(Box::new(move |c: &farfield_core::Camera| opened.far_draws(id, c)));
+    let truth = Truth { original, drawn: Box::new(move |d| pieces.borrow_mut().drawn(d, &|b| opened.fetch(b))) };
+    CellAudit {
+        scene: &lab.prepared.scene,
+        views: &lab.prepared.views,
+        cell: &opened.built.cells[&id].cell,
+        cells: &*opened.division.cells,
+        asset: AssetId(1),
+        claims,
+        draws,
+        truth: Some(truth),
+    }
+}
+
+#[test]
+fn explore() {
+    let folder = models("explore").unwrap();
+    let which = std::env::var("CASE").unwrap_or_default();
+    let cases = [
+        ("armadillo", file(&folder, "scans/armadillo.obj.gz")),
+        ("igea", file(&folder, "scans/igea.ply.gz")),
+        ("dragon", file(&folder, "scans/dragon_vrip.ply.gz")),
+        ("asteroid", "source = \"asteroid\"\ntriangles = 200_000".to_owned()),
+    ];
+    for (name, scene) in cases.iter().filter(|c| c.0.contains(&which)) {
+        for metric in ["appearance", "hausdorff"] {
+            let t = std::time::Instant::now();
+            let lab = lab(scene, &format!("metric = {{ type = \"{metric}\" }}"));
+            lab.opened(0).unwrap();
+            eprintln!("{name} {metric}: {} triangles, built {:?}", lab.prepared.scene.triangles(), t.elapsed());
+            let t = std::time::Instant::now();
+            let opened = lab.opened(0).unwrap();
+            eprintln!("{name} {metric}: {:?} in {:?}", Tree::new(&lab, &opened).check(500), t.elapsed());
+            let t = std::time::Instant::now();
+            eprintln!("{name} {metric}: {:?} in {:?}", on_screen(&lab, 20), t.elapsed());
+        }
+    }
+}
