@@ -7,7 +7,7 @@
 //! width of more than the claim plus one pixel. *Near triangles* are counted by culling, with the four side planes, every
 //! placed chunk that the view's split calls near, for views that the cell serves. An *unseen solid angle* is measured over the six pictures
 //! of a cube at a random viewpoint: far surfaces where the far field alone shows nothing, or something farther away (see `unseen`). A *surface
-//! distance* is the largest over a picture of the scene, from a random viewpoint of the cell, or, where any viewpoint is one, from the scene's inside to
+//! distance* is the largest over a part of a picture of the scene, from a random viewpoint of the cell, or, where any viewpoint is one, from the scene's inside to
 //! some scene's sizes away (see [`crate::measure::surface_distances`]).
 //! Samples can refute a bound, not prove it.
 
@@ -227,8 +227,13 @@ pub fn crop(camera: &Camera, target: &Aabb) -> Option<Camera> {
         let px = camera.project((corner.as_dvec3() - camera.eye).as_vec3())?.truncate();
         (lo, hi) = (lo.min(px), hi.max(px));
     }
+    cut(camera, (lo - 2.0).floor(), (hi + 2.0).ceil())
+}
+
+/// The part of a camera's picture between two corners, pixels from the top left; `None` where nothing lies between them.
+fn cut(camera: &Camera, lo: glam::Vec2, hi: glam::Vec2) -> Option<Camera> {
     let size = glam::Vec2::new(camera.size[0] as f32, camera.size[1] as f32);
-    let (lo, hi) = ((lo - 2.0).floor().max(glam::Vec2::ZERO), (hi + 2.0).ceil().min(size));
+    let (lo, hi) = (lo.max(glam::Vec2::ZERO), hi.min(size));
     if !lo.cmplt(hi).all() {
         return None;
     }
