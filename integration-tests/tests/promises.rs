@@ -438,7 +438,7 @@ fn no_sample_refutes_a_node_or_any_of_500_pictures() {
 
 #[test]
 fn false_promises_are_caught() {
-    let lab = lab(ASTEROID, "metric = { type = \"hausdorff\" }");
+    let lab = lab(ASTEROID, "resolution = 64.0, metric = { type = \"hausdorff\" }");
     let mut tree = Tree::new(&lab, &lab.opened(0).unwrap());
     // Nodes that were simplified by distance alone promise nothing of looks.
     tree.appearance = true;
@@ -452,9 +452,9 @@ fn false_promises_are_caught() {
     let found = tree.check(100);
     println!("promises cut: {found:?}");
     assert!(found.beyond > 100, "{found:?}");
-    // What is drawn for a picture of an eighth of the pixels.
+    // What is drawn for a picture of an eighth of the pixels across.
     let coarse = |c: &Camera| Camera { size: c.size.map(|s| s.div_ceil(8)), ..*c };
     let seen = on_screen(&lab, 10, &coarse);
     println!("drawn for fewer pixels: {seen:?}");
-    assert!(seen.beyond > 100 && (0.6..4.0).contains(&seen.max_px), "{seen:?}");
+    assert!(seen.beyond > 100 && (0.6..10.0).contains(&seen.max_px), "{seen:?}");
 }
