@@ -16,18 +16,24 @@
 use std::cell::RefCell;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use farfield_core::bvh::{BoxBvh, nearest_on_triangle};
+use farfield_core::claim::Quantity;
 use farfield_core::id::{AssetId, Block, CellId, LocalPayload, PayloadRef};
 use farfield_core::payload::{MeshPart, Part, Payload};
 use farfield_core::scene::{Gathered, Scene, gather};
 use farfield_core::{Aabb, Camera};
 use farfield_experiments::audit::{CellAudit, Truth};
-use farfield_experiments::config::BackendName;
-use farfield_experiments::measure::{Piece, Pieces, Surface, SurfaceErrors};
+use farfield_experiments::config::{self, BackendName};
+use farfield_experiments::failure::Failure;
+use farfield_experiments::list::entries;
+use farfield_experiments::measure::{Piece, Pieces, SURFACE_RESOLUTION_PX, Surface, SurfaceErrors};
+use farfield_experiments::results::Summary;
+use farfield_experiments::run::{self, Options};
 use farfield_experiments::walk::Opened;
 use farfield_far_hlod::{Promise, promises};
-use farfield_integration_tests::lab::{Lab, models};
+use farfield_integration_tests::lab::{Lab, backends, models};
 use glam::{DVec3, Vec3};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -457,4 +463,57 @@ fn false_promises_are_caught() {
     let seen = on_screen(&lab, 10, &coarse);
     println!("drawn for fewer pixels: {seen:?}");
     assert!(seen.beyond > 100 && (0.6..10.0).contains(&seen.max_px), "{seen:?}");
+}
+
+/// Runs an experiment with a bounded pipeline on a backend; its summary and its report.
+fn ran(backend: BackendName, more: &str) -> Result<(Summary, String), Failure> {
+    let (backend, out) = (backend.name(), tempfile::tempdir().unwrap());
+    let text = format!(
+        "[scene]\nsource = \"asteroid\"\ntriangles = 30_000\n[view]\nresolution = [96, 64]\npath = \"orbit\"\nframes = 4\n\
+         [measure]\nevery = 1\naudit_views = 6\n{more}\n\
+         [[pipeline]]\nname = \"all geometry\"\nbackend = \"{backend}\"\nfar_field = {{ type = \"geometry\" }}\n\
+         [[pipeline]]\nname = \"bounded\"\nbackend = \"{backend}\"\n\
+         far_field = {{ type = \"point-polygon-hlod\", metric = {{ type = \"hausdorff\" }} }}\n"
+    );
+    let experiment = config::parse("experiment", &text, &[], Path::new(""), &entries()).unwrap();
+    let never = AtomicBool::new(false);
+    let options = Options { store: out.path().join("store"), quiet: true, cancel: &never, say: &|_| () };
+    run::run(&experiment, &out.path().join("out"), &options)?;
+    let read = |name: &str| std::fs::read_to_string(out.path().join("out").join(name)).unwrap();
+    Ok((serde_json::from_str(&read("summary.json")).unwrap(), read("report.html")))
+}
+
+#[test]
+fn runs_report_surface_distances_where_they_are_asked_for() {
+    for backend in backends("runs_report_surface_distances_where_they_are_asked_for") {
+        let (summary, report) = ran(backend, "surface_distance = true").unwrap();
+        let bounded = &summary.pipelines[1];
+        let d = bounded.error.unwrap().surface_distance.unwrap();
+        println!("{}: {d:?} {:?}", backend.name(), bounded.bounds);
+        assert!(d.pixels > 4000 && d.pixels_beyond == 0 && d.p999_px <= d.max_px, "{}: {d:?}", backend.name());
+        assert!(d.max_px > 0.01 && d.max_px < 0.5 + SURFACE_RESOLUTION_PX, "{}: {d:?}", backend.name());
+        let [audited] = &bounded.bounds[..] else { panic!("{:?}", bounded.bounds) };
+        assert_eq!((audited.quantity, audited.predicted_max), (Quantity::SurfaceDistancePx, 0.5));
+        assert!(audited.samples == 6 && audited.violations == 0 && audited.measured_max > 0.01, "{audited:?}");
+        assert!(report.contains("<h2>Surface distance</h2>") && report.contains("surface_distance_px"));
+    }
+    let (summary, report) = ran(BackendName::Cpu, "").unwrap();
+    assert!(summary.pipelines.iter().all(|p| p.bounds.is_empty()));
+    assert!(summary.pipelines[1].error.unwrap().surface_distance.is_none() && !report.contains("Surface distance"));
+}
+
+#[test]
+fn scenes_out_of_core_have_no_surface_to_search() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("triangle.obj");
+    std::fs::write(&file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let text = |out_of_core: bool| {
+        format!(
+            "[scene]\npath = {file:?}\nout_of_core = {out_of_core}\n[view]\nframes = 1\npath = \"still\"\n\
+             [measure]\nsurface_distance = true\n[[pipeline]]\nname = \"a\"\nfar_field = {{ type = \"geometry\" }}\n"
+        )
+    };
+    assert!(Lab::new(&text(false), Path::new("")).is_ok());
+    let refused = Lab::new(&text(true), Path::new("")).err().unwrap();
+    assert!(refused.contains("surface_distance") && refused.contains("triangle.obj"), "{refused}");
 }
