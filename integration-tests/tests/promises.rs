@@ -19,22 +19,24 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use farfield_core::bvh::{BoxBvh, nearest_on_triangle};
+use farfield_core::camera::ViewModel;
 use farfield_core::claim::Quantity;
-use farfield_core::id::{AssetId, Block, CellId, LocalPayload, PayloadRef};
+use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind};
+use farfield_core::id::{AssetId, Block, CellId, LocalPayload, PayloadRef, TargetId};
 use farfield_core::payload::{MeshPart, Part, Payload};
 use farfield_core::scene::{Gathered, Scene, gather};
 use farfield_core::{Aabb, Camera};
-use farfield_experiments::audit::{CellAudit, Truth};
+use farfield_experiments::audit::{CellAudit, Truth, crop};
 use farfield_experiments::config::{self, BackendName};
 use farfield_experiments::failure::Failure;
 use farfield_experiments::list::entries;
-use farfield_experiments::measure::{Piece, Pieces, SURFACE_RESOLUTION_PX, Surface, SurfaceErrors};
+use farfield_experiments::measure::{Piece, Pieces, SURFACE_RESOLUTION_PX, Surface, SurfaceErrors, surface_distances};
 use farfield_experiments::results::Summary;
 use farfield_experiments::run::{self, Options};
 use farfield_experiments::walk::Opened;
 use farfield_far_hlod::{Promise, promises};
 use farfield_integration_tests::lab::{Lab, backends, models};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -516,4 +518,70 @@ fn scenes_out_of_core_have_no_surface_to_search() {
     assert!(Lab::new(&text(false), Path::new("")).is_ok());
     let refused = Lab::new(&text(true), Path::new("")).err().unwrap();
     assert!(refused.contains("surface_distance") && refused.contains("triangle.obj"), "{refused}");
+}
+
+/// A camera that sees `place` from `away`, along `to`, at the top right of its picture, where the picture shows lengths across as long as anywhere, so that
+/// `outwards`, across `to`, points from the picture's middle to that corner.
+fn at_the_corner(v: &ViewModel, place: Vec3, to: Vec3, outwards: Vec3, away: f32) -> Camera {
+    let corner = Vec2::new((0.5 * v.fov_x_rad()).tan(), (0.5 * v.fov_y_rad).tan()) * 0.97;
+    let (sine, cosine) = corner.length().atan().sin_cos();
+    let (forward, radial) = (to * cosine - outwards * sine, outwards * cosine + to * sine);
+    let up = (radial * corner.y + radial.cross(forward) * corner.x) / corner.length();
+    Camera::looking((place - to * away).as_dvec3(), forward, up, v.fov_y_rad, v.resolution, v.near)
+}
+
+/// Not where chance leads, but where it hurts: the places of a node that are farthest off, seen along the surface, in the corner of a wide picture, from
+/// as near as the node is drawn.
+#[test]
+#[ignore = "fails: what a view tolerates (walk/opened.rs) leaves out that a length is 1 / cos^2 as long beside the picture's middle"]
+fn places_in_a_pictures_corner_keep_the_promise() {
+    let lab = lab("source = \"asteroid\"\ntriangles = 400_000", "metric = { type = \"hausdorff\" }");
+    let opened = lab.opened(0).unwrap();
+    let (tree, v) = (Tree::new(&lab, &opened), &lab.prepared.views);
+    let (original, mut pieces) = (tree.pieces.original(), tree.pieces.for_another());
+    let mut device = lab.device(BackendName::Cpu).unwrap();
+    for b in opened.payloads(CellId(0)) {
+        device.load(b, tree.scene, &|b| opened.fetch(b)).unwrap();
+    }
+    let mut places: Vec<(f32, u32, Vec3, Vec3)> = vec![];
+    for (i, p) in (0u32..).zip(&tree.promises).filter(|(_, p)| !p.leaf) {
+        let mut rng = ChaCha8Rng::seed_from_u64(SEED + u64::from(i));
+        let mesh = gather(tree.scene, p.chunks.iter().copied(), DVec3::ZERO).unwrap();
+        let payload = &tree.payloads[i as usize];
+        let parts = payload.parts.iter().filter_map(|p| Piece::of_part(payload.origin, p).map(Arc::new));
+        let drawn = Surface::new(parts.collect());
+        for _ in 0..2000 {
+            let place = mesh.positions[rng.random_range(0..mesh.positions.len())];
+            let near = drawn.nearest(place).unwrap();
+            places.push((near.distance / p.error, i, place, near.point));
+        }
+    }
+    places.sort_by(|a, b| b.0.total_cmp(&a.0));
+    places.dedup_by_key(|p| p.2);
+    let (mut all, mut seen) = (SurfaceErrors::default(), 0);
+    for &(_, node, place, near) in &places[..60] {
+        let outwards = (place - near).normalize();
+        let (across, along) = outwards.any_orthonormal_pair();
+        for turn in 0..8 {
+            let (s, c) = (turn as f32 * 0.25 * std::f32::consts::PI).sin_cos();
+            let distances = (0..400).map(|k| 0.01 * 1.03f32.powi(k) * tree.scene.bounds.size().length());
+            let cameras = distances.map(|d| (d, at_the_corner(v, place, across * c + along * s, outwards, d)));
+            let of_node = |d: &Draw| matches!(&d.what, DrawWhat::Payload { id, .. } if id.id.0 == node);
+            let mut drawn = cameras.map(|(d, c)| (d, c, opened.far_draws(CellId(0), &c)));
+            let Some((away, whole, draws)) = drawn.find(|d| d.2.iter().any(of_node)) else { continue };
+            assert!(draws.iter().all(|d| d.error_px <= 0.5));
+            let round = 20.0 * away / v.px_per_tan();
+            let Some(camera) = crop(&whole, &Aabb { min: place - round, max: place + round }) else { continue };
+            let surface = pieces.drawn(&draws, &|b| opened.fetch(b)).unwrap().unwrap();
+            let chunks = DrawWhat::Chunks(tree.scene.all_chunks());
+            let reference = vec![Draw { what: chunks, bounds: tree.scene.bounds, error_px: 0.0 }];
+            let pass = |to, draws| Pass { kind: PassKind::Surface, camera, writes: TargetId(to), draws };
+            device.backend.render(&DrawList { passes: vec![pass(5, reference), pass(6, draws)] }).unwrap();
+            let [r, c] = [5, 6].map(|t| device.backend.read_surface(TargetId(t)).unwrap());
+            all = all.joined(SurfaceErrors::of(&surface_distances(&camera, [&r, &c], &original, &surface), Some(0.5)));
+            seen += 1;
+        }
+    }
+    println!("{seen} corners: {all:?}");
+    assert!(seen > 200 && all.beyond == 0, "{seen} corners: {all:?}");
 }
