@@ -394,8 +394,9 @@ fn on_screen(lab: &Lab, views: usize, drawn_for: &dyn Fn(&Camera) -> Camera) -> 
     all
 }
 
-/// Checks a scene with both metrics: `samples` of each kind a node, and `views` pictures.
-fn check(name: &str, scene: &str, samples: usize, views: usize) {
+/// Checks a scene with both metrics, `samples` of each kind a node; the pixels of `views` pictures that are beyond what is claimed.
+fn check(name: &str, scene: &str, samples: usize, views: usize) -> u64 {
+    let mut beyond = 0;
     for metric in ["appearance", "hausdorff"] {
         let lab = lab(scene, &format!("metric = {{ type = \"{metric}\" }}"));
         let found = Tree::new(&lab, &lab.opened(0).unwrap()).check(samples);
@@ -407,8 +408,9 @@ fn check(name: &str, scene: &str, samples: usize, views: usize) {
         assert!(found.most[1] > 0.4, "{name}, {metric}: {found:?}");
         let seen = on_screen(&lab, views, &|c| *c);
         println!("{name}, {metric}, {views} views: {seen:?}");
-        assert_eq!(seen.beyond, 0, "{name}, {metric}: {seen:?}");
+        beyond += seen.beyond;
     }
+    beyond
 }
 
 /// A generated scene.
@@ -416,7 +418,7 @@ const ASTEROID: &str = "source = \"asteroid\"\ntriangles = 100_000";
 
 #[test]
 fn no_sample_refutes_a_node_or_a_picture_of_a_generated_scene() {
-    check("asteroid", ASTEROID, 200, 10);
+    assert_eq!(check("asteroid", ASTEROID, 200, 10), 0);
 }
 
 #[test]
@@ -424,7 +426,7 @@ fn no_sample_refutes_a_node_or_a_picture_of_scans() {
     let Some(folder) = models("no_sample_refutes_a_node_or_a_picture_of_scans") else { return };
     let dragon = "statuary/dragon_vrip_res2.ply.gz";
     for (name, path) in [("armadillo", "scans/armadillo.obj.gz"), ("igea", "scans/igea.ply.gz"), ("dragon", dragon)] {
-        check(name, &file(&folder, path), 200, 10);
+        assert_eq!(check(name, &file(&folder, path), 200, 10), 0, "{name}");
     }
 }
 
@@ -437,11 +439,12 @@ fn no_sample_refutes_a_node_or_a_picture_of_scans() {
 #[ignore = "minutes; run it by name"]
 fn no_sample_refutes_a_node_or_any_of_500_pictures() {
     let Some(folder) = models("no_sample_refutes_a_node_or_any_of_500_pictures") else { return };
+    let mut beyond = check("asteroid", "source = \"asteroid\"\ntriangles = 1_000_000", 1000, 125);
     let dragon = "scans/dragon_vrip.ply.gz";
-    for (name, path) in [("dragon", dragon), ("igea", "scans/igea.ply.gz"), ("armadillo", "scans/armadillo.obj.gz")] {
-        check(name, &file(&folder, path), 1000, 125);
+    for (name, path) in [("armadillo", "scans/armadillo.obj.gz"), ("igea", "scans/igea.ply.gz"), ("dragon", dragon)] {
+        beyond += check(name, &file(&folder, path), 1000, 125);
     }
-    check("asteroid", "source = \"asteroid\"\ntriangles = 1_000_000", 1000, 125);
+    assert_eq!(beyond, 0);
 }
 
 #[test]
