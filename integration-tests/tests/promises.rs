@@ -394,14 +394,14 @@ fn on_screen(lab: &Lab, views: usize, drawn_for: &dyn Fn(&Camera) -> Camera) -> 
     all
 }
 
-/// Checks a scene with both metrics, `samples` of each kind a node; the pixels of `views` pictures that are beyond what is claimed.
+/// Checks a scene with both metrics, `samples` of each kind a node and `views` pictures; how much is beyond what is promised: places, looks, pixels.
 fn check(name: &str, scene: &str, samples: usize, views: usize) -> u64 {
     let mut beyond = 0;
     for metric in ["appearance", "hausdorff"] {
         let lab = lab(scene, &format!("metric = {{ type = \"{metric}\" }}"));
         let found = Tree::new(&lab, &lab.opened(0).unwrap()).check(samples);
         println!("{name}, {metric}, {} triangles: {found:?}", lab.prepared.scene.triangles());
-        assert_eq!((found.beyond, found.made_of.beyond), (0, 0), "{name}, {metric}: {found:?}");
+        beyond += (found.beyond + found.made_of.beyond) as u64;
         // Looks are compared in the vertices that a node is made of; in between, and so for vertices of the original that are gone two levels
         // below, the promise is an estimate.
         assert!(found.original.beyond * 5000 <= found.original.vertices, "{name}, {metric}: {found:?}");
