@@ -16,6 +16,9 @@ pub enum Quantity {
     /// Far surfaces that a viewpoint should see and does not, over the whole sphere of directions, steradians.
     #[serde(rename = "unseen_solid_angle_sr")]
     UnseenSolidAngle,
+    /// How far the surface that a pixel shows lies from the original surface, as the picture shows that distance, and the other way round;
+    /// pixels. What a splat covers beside its point does not count.
+    SurfaceDistancePx,
 }
 
 impl Quantity {
@@ -25,6 +28,7 @@ impl Quantity {
             Self::HoleWidthPx => "hole_width_px",
             Self::NearTriangles => "near_triangles",
             Self::UnseenSolidAngle => "unseen_solid_angle_sr",
+            Self::SurfaceDistancePx => "surface_distance_px",
         }
     }
 }

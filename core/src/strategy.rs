@@ -184,6 +184,12 @@ pub trait FarField: Send + Sync + Debug {
         DrawBudget::default()
     }
 
+    /// What its settings promise of every frame for which all that it wants is there; by default nothing. What is known only by baking is claimed
+    /// there.
+    fn frame_claims(&self) -> Vec<Claim> {
+        vec![]
+    }
+
     /// The settings that only frames depend on: what is baked is the same whatever they say, so that they are no part of a store
     /// key. By default none.
     fn frame_settings(&self) -> &'static [&'static str] {

@@ -183,6 +183,9 @@ pub struct ErrorSummary {
     /// pixels.
     #[serde(default)]
     pub depth_off_fraction: Option<MeanMax>,
+    /// Distances between the surfaces that the candidate and the reference show, where `[measure] surface_distance` asks for them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface_distance: Option<SurfaceDistance>,
     /// Pairs of frames that follow each other over which change was measured.
     #[serde(default)]
     pub frame_pairs: usize,
@@ -196,6 +199,19 @@ pub struct ErrorSummary {
     /// The same over those.
     #[serde(default)]
     pub temporal_change_at_borders_grey_levels: Option<MeanMax>,
+}
+
+/// How far what the candidate shows lies from the original surface, and the other way round, over the measured frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceDistance {
+    /// The largest, pixels.
+    pub max_px: f64,
+    /// The largest 99.9th percentile of a frame, pixels.
+    pub p999_px: f64,
+    /// Pixels beyond what the far field claims; 0 where it claims nothing.
+    pub pixels_beyond: u64,
+    /// Pixels looked at, of both pictures.
+    pub pixels: u64,
 }
 
 /// A claim against what was measured. Measuring samples: it can refute, not prove.
@@ -256,6 +272,8 @@ pub struct FrameRow {
     pub hole_fraction: Option<f64>,
     /// Pixels whose depth is off, over all pixels.
     pub depth_off_fraction: Option<f64>,
+    /// The largest distance between the surfaces that the frame and the reference show, pixels.
+    pub surface_distance_max_px: Option<f64>,
     /// Change of the error since the frame before, grey levels; empty where one of the two was not read.
     pub temporal_change_grey_levels: Option<f64>,
 }

@@ -18,7 +18,7 @@ use crate::config::{BackendName, BudgetSettings, BuildWhen, Experiment, Pipeline
 use crate::failure::Failure;
 use crate::floor::floor;
 use crate::gallery::Gallery;
-use crate::measure::{self, Change, EQUAL_FRAMES_NOTE, FrameErrors, Metrics, Reads, Rendered};
+use crate::measure::{self, Change, EQUAL_FRAMES_NOTE, FrameErrors, Metrics, Pieces, Reads, Rendered};
 use crate::progress::Progress;
 use crate::report;
 use crate::results::{
@@ -209,6 +209,9 @@ pub fn run(experiment: &Experiment, out: &Path, options: &Options<'_>) -> Result
     std::fs::create_dir_all(out.join("frames")).map_err(io)?;
     let references = References::new(prepared.views.resolution).map_err(io)?;
     let mut devices: BTreeMap<BackendName, Device> = BTreeMap::new();
+    let failed = |f| Failure::during("the scene's surface", f);
+    let surface = experiment.measure.surface_distance.then(|| Pieces::new(&prepared.scene));
+    let surface = surface.transpose().map_err(failed)?;
     let mut gallery = Gallery::new(experiment.measure.pictures);
     let mut done: BTreeMap<usize, (PipelineSummary, Vec<FrameRow>)> = BTreeMap::new();
     let mut order = all.clone();
@@ -218,7 +221,7 @@ pub fn run(experiment: &Experiment, out: &Path, options: &Options<'_>) -> Result
             v.insert(Device::new(device::open(backends[i], &prepared.scene)?));
         }
         let device = devices.get_mut(&backends[i]).ok_or(Failure::Cancelled)?;
-        let one = One { experiment, prepared: &prepared, site: &site, options, index: i };
+        let one = One { experiment, prepared: &prepared, site: &site, options, index: i, surface: surface.as_ref() };
         let built = built[i].take().ok_or(Failure::Cancelled)?;
         done.insert(i, one.walk(built, device, &references, &mut gallery)?);
     }
@@ -258,6 +261,8 @@ struct One<'a> {
     site: &'a Site<'a>,
     options: &'a Options<'a>,
     index: usize,
+    /// Where surfaces are compared.
+    surface: Option<&'a Pieces>,
 }
 
 impl One<'_> {
@@ -295,6 +300,9 @@ impl One<'_> {
         let budget = if self.is_reference() { BudgetSettings::default() } else { e.budget.clone() };
         let info = device.backend.info().clone();
         let mut walker = Walker::new(&tour, opened, on_demand, device, &budget);
+        if let Some(scene) = self.surface {
+            walker.compare_surfaces(scene);
+        }
         let metrics = Metrics { ssim: e.measure.ssim, flip: e.measure.flip };
         let (mut walked, mut rows, mut errors): (Vec<Walked>, Vec<FrameRow>, Vec<FrameErrors>) =
             (vec![], vec![], vec![]);
@@ -324,7 +332,9 @@ impl One<'_> {
                 }
                 before = Some(after);
                 if mine.measured(i) {
-                    let found = measure::frame(&reference, &candidate, metrics);
+                    let mut found = measure::frame(&reference, &candidate, metrics);
+                    let surfaces = [&reference.surface, &candidate.surface];
+                    found.surface = walker.surface_errors(camera, surfaces).map_err(failed(i))?;
                     with_errors(&mut row, &found);
                     gallery.consider(name, i, i / e.measure.every, &found, candidate.picture);
                     errors.push(found);
@@ -412,6 +422,7 @@ fn with_errors(row: &mut FrameRow, e: &FrameErrors) {
     row.psnr_y_object_db = (e.luminance_on_objects.pixels > 0).then(|| e.luminance_on_objects.psnr_db());
     (row.ssim, row.flip, row.hole_fraction) = (e.ssim, e.flip, Some(e.hole_fraction));
     row.depth_off_fraction = Some(e.depth_off_fraction);
+    row.surface_distance_max_px = e.surface.map(|s| s.max_px);
 }
 
 /// The number of a pipeline by its name.

@@ -41,7 +41,7 @@ pub fn scene(experiment: &Experiment, options: &Options<'_>) -> Result<Loaded, F
     let s = &experiment.scene;
     let to_world = DAffine3::from_translation(DVec3::from(s.offset)) * DAffine3::from_scale(DVec3::splat(s.scale));
     match &s.path {
-        Some(path) => file(s, path, options),
+        Some(path) => file(experiment, path, options),
         None => generated(s, to_world),
     }
 }
@@ -49,7 +49,8 @@ pub fn scene(experiment: &Experiment, options: &Options<'_>) -> Result<Loaded, F
 /// What a model takes in memory while it is loaded whole, in bytes of its file: 4.3 were measured on binary PLY, the densest.
 const WHOLE_TAKES: u64 = 5;
 
-fn file(s: &SceneSettings, path: &str, options: &Options<'_>) -> Result<Loaded, Failure> {
+fn file(experiment: &Experiment, path: &str, options: &Options<'_>) -> Result<Loaded, Failure> {
+    let s = &experiment.scene;
     let up = match s.up {
         Up::Y => load::Up::Y,
         Up::Z => load::Up::Z,
@@ -63,6 +64,12 @@ fn file(s: &SceneSettings, path: &str, options: &Options<'_>) -> Result<Loaded, 
             bytes.is_some_and(|b| b > s.memory_bytes / WHOLE_TAKES)
         }
     };
+    if stream && experiment.measure.surface_distance {
+        let cause = format!(
+            "surface_distance = true in [measure] holds all of a scene in memory, and {path} is read out of core"
+        );
+        return Err(refused(&cause));
+    }
     let (scene, warnings) = if stream {
         streamed(s, Path::new(path), &how, options)?
     } else {

@@ -89,6 +89,7 @@ fn audit(lab: &Lab, pipeline: usize, told: &dyn Fn(&Claim) -> f64) -> Vec<Measur
         });
         let draws = |c: &farfield_core::Camera| opened.far_draws(id, c);
         let audit = CellAudit {
+            truth: None,
             scene: &lab.prepared.scene,
             views: &lab.prepared.views,
             cell: &opened.built.cells[&id].cell,

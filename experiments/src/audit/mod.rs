@@ -6,9 +6,12 @@
 //! the measurement's resolution: a slit of any width may catch one row of pixel centres, so that a violation is a measured
 //! width of more than the claim plus one pixel. *Near triangles* are counted by culling, with the four side planes, every
 //! placed chunk that the view's split calls near, for views that the cell serves. An *unseen solid angle* is measured over the six pictures
-//! of a cube at a random viewpoint: far surfaces where the far field alone shows nothing, or something farther away (see `unseen`).
+//! of a cube at a random viewpoint: far surfaces where the far field alone shows nothing, or something farther away (see `unseen`). A *surface
+//! distance* is the largest over a part of a picture of the scene, from a random viewpoint of the cell, or, where any viewpoint is one, from the scene's inside to
+//! some scene's sizes away (see [`crate::measure::surface_distances`]).
 //! Samples can refute a bound, not prove it.
 
+mod surface;
 mod unseen;
 
 use std::collections::BTreeMap;
@@ -25,7 +28,7 @@ use farfield_core::{Aabb, Camera, Fault};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::measure::{hole_mask, hole_width_px};
+use crate::measure::{SURFACE_RESOLUTION_PX, Surface, hole_mask, hole_width_px};
 use crate::results::{BoundAudit, percentile};
 
 /// Targets that audits render to.
@@ -51,7 +54,20 @@ pub struct CellAudit<'a> {
     pub claims: &'a [Claim],
     /// The far field's draws for a camera in the cell.
     pub draws: &'a dyn Fn(&Camera) -> Vec<Draw>,
+    /// The surfaces that a claimed surface distance is held against; without it none is measured.
+    pub truth: Option<Truth<'a>>,
 }
+
+/// Surfaces to search.
+pub struct Truth<'a> {
+    /// Of the scene.
+    pub original: &'a Surface,
+    /// Of what is drawn; `None` where that has none.
+    pub drawn: Box<DrawnSurface<'a>>,
+}
+
+/// Makes the surface of draws.
+pub type DrawnSurface<'a> = dyn Fn(&[Draw]) -> Result<Option<Surface>, Fault> + 'a;
 
 /// An object that is drawn from the cell's centre, with its box and the largest claim of its payloads.
 struct Object {
@@ -84,6 +100,7 @@ fn resolution(q: Quantity) -> f64 {
         Quantity::HoleWidthPx => 1.0,
         Quantity::NearTriangles => 0.0,
         Quantity::UnseenSolidAngle => unseen::RESOLUTION_SR,
+        Quantity::SurfaceDistancePx => SURFACE_RESOLUTION_PX,
     }
 }
 
@@ -94,8 +111,9 @@ impl CellAudit<'_> {
     /// What the backend gives.
     pub fn sample(&self, backend: &mut dyn Backend, n: usize, seed: u64) -> Result<Vec<Measured>, Fault> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ u64::from(self.cell.outline.id.0).rotate_left(32));
-        // Of a cell as a whole the far field's unseen surfaces are measured; its holes are measured object by object.
-        let own = self.claims.iter().filter(|c| c.quantity == Quantity::UnseenSolidAngle);
+        // Of a cell as a whole the far field's unseen surfaces are measured, and how far they are off; its holes are measured object by object.
+        let of_all = [Quantity::UnseenSolidAngle, Quantity::SurfaceDistancePx];
+        let own = self.claims.iter().filter(|c| of_all.contains(&c.quantity));
         let whole = self.cell.claims.iter().chain(own).filter(|c| c.payload.is_none());
         let mut questions: Vec<(Quantity, f64, Option<Object>)> = whole.map(|c| (c.quantity, c.max, None)).collect();
         questions.extend(self.objects().into_iter().map(|o| (Quantity::HoleWidthPx, o.claimed, Some(o))));
@@ -107,6 +125,10 @@ impl CellAudit<'_> {
                 (Quantity::HoleWidthPx, Some(object)) => self.hole_width(backend, object, &mut rng)?,
                 (Quantity::HoleWidthPx, None) => None,
                 (Quantity::UnseenSolidAngle, _) => self.unseen_solid_angle(backend, &mut rng)?,
+                (Quantity::SurfaceDistancePx, _) => {
+                    let all = self.surface_distances(backend, &mut rng)?;
+                    all.map(|all| all.last().copied().unwrap_or(0.0).into())
+                }
             };
             out.extend(measured.map(|measured| Measured { quantity: *quantity, claimed: *claimed, measured }));
         }
@@ -205,8 +227,13 @@ pub fn crop(camera: &Camera, target: &Aabb) -> Option<Camera> {
         let px = camera.project((corner.as_dvec3() - camera.eye).as_vec3())?.truncate();
         (lo, hi) = (lo.min(px), hi.max(px));
     }
+    cut(camera, (lo - 2.0).floor(), (hi + 2.0).ceil())
+}
+
+/// The part of a camera's picture between two corners, pixels from the top left; `None` where nothing lies between them.
+fn cut(camera: &Camera, lo: glam::Vec2, hi: glam::Vec2) -> Option<Camera> {
     let size = glam::Vec2::new(camera.size[0] as f32, camera.size[1] as f32);
-    let (lo, hi) = ((lo - 2.0).floor().max(glam::Vec2::ZERO), (hi + 2.0).ceil().min(size));
+    let (lo, hi) = (lo.max(glam::Vec2::ZERO), hi.min(size));
     if !lo.cmplt(hi).all() {
         return None;
     }
@@ -242,6 +269,9 @@ pub fn join(claimant: &str, measured: &[Measured]) -> Vec<BoundAudit> {
                         "a sample violates its own claim when it exceeds it by more than one pixel".into()
                     }
                     Quantity::NearTriangles => String::new(),
+                    Quantity::SurfaceDistancePx => format!(
+                        "the largest distance over a picture; it violates its claim by more than {SURFACE_RESOLUTION_PX:.3} px"
+                    ),
                     Quantity::UnseenSolidAngle => format!(
                         "counted by pixels of cubes of {} px a face: a sample violates its claim by more than one of them",
                         unseen::FACE_PX

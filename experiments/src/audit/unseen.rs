@@ -157,6 +157,7 @@ mod tests {
             |_: &Camera| vec![Draw { what: DrawWhat::Chunks(kept.clone()), bounds: scene.bounds, error_px: 0.0 }];
         let claim = Claim { quantity: Quantity::UnseenSolidAngle, payload: None, max: claimed };
         let audit = CellAudit {
+            truth: None,
             scene,
             views: &views,
             cell: &cell,

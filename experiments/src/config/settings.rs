@@ -247,6 +247,10 @@ pub struct MeasureSettings {
     pub ssim: bool,
     /// FLIP.
     pub flip: bool,
+    /// How far what is shown lies from the original surface, and the other way round, in pixels: in measured frames, and where a far
+    /// field claims it, in audits. Holds the whole scene in a search tree, about 100 bytes a triangle, and every payload that was drawn; not
+    /// for scenes out of core.
+    pub surface_distance: bool,
     /// Held-out viewpoints at which each pipeline's claims are audited, over all its cells.
     pub audit_views: usize,
     /// Frames shown in the report, a pipeline, beside its worst one.
@@ -261,7 +265,17 @@ pub struct MeasureSettings {
 
 impl Default for MeasureSettings {
     fn default() -> Self {
-        Self { every: 4, temporal: true, ssim: true, flip: true, audit_views: 64, pictures: 2, warm_up: 1, repeats: 1 }
+        Self {
+            every: 4,
+            temporal: true,
+            ssim: true,
+            flip: true,
+            surface_distance: false,
+            audit_views: 64,
+            pictures: 2,
+            warm_up: 1,
+            repeats: 1,
+        }
     }
 }
 

@@ -7,17 +7,19 @@
 mod depth;
 mod holes;
 mod psnr;
+mod surface;
 mod temporal;
 
 pub use depth::{DEPTH_OFF, depth_off_fraction};
 pub use holes::{hole_mask, hole_width_px};
 pub use psnr::{SquaredError, cap_db};
+pub use surface::{Nearest, Piece, Pieces, SURFACE_RESOLUTION_PX, Surface, SurfaceErrors, surface_distances};
 pub use temporal::{Change, Reads, error_luma, temporal_change};
 
 use farfield_core::image::{Picture, SurfaceImage};
 use image::GrayImage;
 
-use crate::results::{ErrorSummary, MeanMax, MeanMin};
+use crate::results::{ErrorSummary, MeanMax, MeanMin, SurfaceDistance};
 
 /// A frame read back: its picture and the surface under it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,6 +54,8 @@ pub struct FrameErrors {
     pub hole_fraction: f64,
     /// Pixels whose depth is off by more than 1 %, or where only one of the two shows a surface, over all pixels.
     pub depth_off_fraction: f64,
+    /// Distances between the surfaces that the two show, where they are measured.
+    pub surface: Option<SurfaceErrors>,
 }
 
 /// Says in words how equal frames enter a mean.
@@ -84,6 +88,7 @@ pub fn frame(reference: &Rendered, candidate: &Rendered, metrics: Metrics) -> Fr
         flip: metrics.flip.then(|| flip(&reference.picture, &candidate.picture).0),
         hole_fraction: holes as f64 / reference.picture.rgba.len().max(1) as f64,
         depth_off_fraction: depth_off_fraction(&reference.surface, &candidate.surface),
+        surface: None,
     }
 }
 
@@ -103,6 +108,9 @@ pub fn summary(frames: &[FrameErrors], changes: &[Change]) -> ErrorSummary {
         ssim: of(|f| f.ssim).filter(|v| !v.is_empty()).map(MeanMin::of),
         flip: of(|f| f.flip).filter(|v| !v.is_empty()).map(MeanMax::of),
         hole_fraction: MeanMax::of(frames.iter().map(|f| f.hole_fraction)),
+        surface_distance: frames.iter().filter_map(|f| f.surface).reduce(SurfaceErrors::joined).map(|s| {
+            SurfaceDistance { max_px: s.max_px, p999_px: s.p999_px, pixels_beyond: s.beyond, pixels: s.pixels }
+        }),
         depth_off_fraction: some(frames.iter().map(|f| f.depth_off_fraction).collect()),
         frame_pairs: changes.len(),
         temporal_change_grey_levels: some(changes.iter().map(|c| c.grey_levels).collect()),

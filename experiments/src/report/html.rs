@@ -212,6 +212,29 @@ fn equal_quality(h: &mut String, pipelines: &[PipelineSummary]) {
            the pipeline is dearer.</p>";
 }
 
+/// How far what is shown lies from the original surface, where that was measured.
+fn surface_distances(h: &mut String, pipelines: &[PipelineSummary]) {
+    let found = |p: &PipelineSummary| Some((p.name.clone(), p.error.as_ref()?.surface_distance?));
+    let rows: Vec<_> = pipelines.iter().filter_map(found).collect();
+    if rows.is_empty() {
+        return;
+    }
+    *h += "<h2>Surface distance</h2><table><tr><th>pipeline</th><th>max px</th><th>p99.9 px</th><th>pixels beyond the claim</th>\
+           <th>pixels</th></tr>";
+    for (name, d) in rows {
+        let (bad, name) = (if d.pixels_beyond > 0 { " class=bad" } else { "" }, text(&name));
+        push(
+            h,
+            format_args!(
+                "<tr><td>{name}</td><td>{:.3}</td><td>{:.3}</td><td{bad}>{}</td><td>{}</td></tr>",
+                d.max_px, d.p999_px, d.pixels_beyond, d.pixels
+            ),
+        );
+    }
+    *h += "</table><p class=note>Of every pixel that shows a surface, how far the image of the nearest point of the original lies away; and of \
+           every pixel of the reference, that of the nearest point that was drawn. The percentile is the largest of the frames'.</p>";
+}
+
 fn details(h: &mut String, s: &Summary) {
     *h += "<h2>Bounds, claimed and measured</h2>";
     if s.pipelines.iter().all(|p| p.bounds.is_empty()) {
@@ -238,6 +261,7 @@ fn details(h: &mut String, s: &Summary) {
         }
         *h += "</table><p class=note>Viewpoints are held out from building. Samples can refute a bound, not prove it.</p>";
     }
+    surface_distances(h, &s.pipelines);
     *h += "<h2>Built, and left out</h2><table><tr><th>pipeline</th><th>cells built</th><th>needed</th><th>of</th><th>seconds</th>\
            <th>stored MB</th><th>peak RSS MB</th><th>original : simplified</th></tr>";
     for p in &s.pipelines {

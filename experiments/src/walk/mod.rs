@@ -14,8 +14,10 @@ use std::cell::RefCell;
 
 use farfield_core::backend::Backend;
 use farfield_core::camera::ViewModel;
-use farfield_core::draw::Shading;
+use farfield_core::claim::{Claim, Quantity};
+use farfield_core::draw::{Draw, Shading};
 use farfield_core::id::{Block, CellId};
+use farfield_core::image::SurfaceImage;
 use farfield_core::scene::Scene;
 use farfield_core::strategy::{Motion, Planner};
 use farfield_core::{Camera, Fault};
@@ -25,9 +27,9 @@ pub use opened::{Drawn, Opened, frame};
 pub use reference::References;
 pub use residency::{Device, Residency};
 
-use crate::audit::{CellAudit, Measured};
+use crate::audit::{CellAudit, Measured, Truth};
 use crate::config::{BudgetSettings, MeasureSettings};
-use crate::measure::Rendered;
+use crate::measure::{Pieces, Rendered, Surface, SurfaceErrors, surface_distances};
 use opened::{PICTURE, SURFACE, Wants, asset_of};
 
 /// What all walks of an experiment share.
@@ -58,6 +60,15 @@ pub struct Walker<'a> {
     upload_bytes_per_frame: Option<u64>,
     last: Option<Camera>,
     frames: usize,
+    /// Where surfaces are compared.
+    surfaces: Option<Surfaces>,
+}
+
+/// What surfaces are compared with, and what was drawn last.
+struct Surfaces {
+    pieces: RefCell<Pieces>,
+    original: Surface,
+    drawn: Vec<Draw>,
 }
 
 /// A frame, timed and counted.
@@ -108,7 +119,14 @@ impl<'a> Walker<'a> {
             upload_bytes_per_frame: budget.upload_bytes_per_frame,
             last: None,
             frames: 0,
+            surfaces: None,
         }
+    }
+
+    /// From here on surfaces can be compared with that of the scene.
+    pub fn compare_surfaces(&mut self, scene: &Pieces) {
+        let pieces = scene.for_another();
+        self.surfaces = Some(Surfaces { original: pieces.original(), pieces: RefCell::new(pieces), drawn: vec![] });
     }
 
     /// Loads what a frame needs: its near chunks, then what the scheduler plans; the bytes of the latter.
@@ -168,6 +186,9 @@ impl<'a> Walker<'a> {
         let uploaded_bytes = self.load(camera, cell)?;
         let residency = &self.residency;
         let drawn = self.opened.draws(cell, camera, &|b| residency.has(b));
+        if let Some(s) = &mut self.surfaces {
+            s.drawn.clone_from(&drawn.draws);
+        }
         // `load` has counted this frame already.
         let list = frame(camera, drawn.draws, &(self.tour.lit)(self.frames - 1));
         let warm_up = if self.frames == 1 { self.tour.measure.warm_up } else { 0 };
@@ -206,14 +227,36 @@ impl<'a> Walker<'a> {
         read(&mut *self.device.backend)
     }
 
+    /// How far what the last frame shows lies from the scene's surface, and what the reference shows from what it drew; `None` where surfaces are
+    /// not compared, or what was drawn has none.
+    ///
+    /// # Errors
+    /// What reading payloads gives.
+    pub fn surface_errors(
+        &self,
+        camera: &Camera,
+        pictures: [&SurfaceImage; 2],
+    ) -> Result<Option<SurfaceErrors>, Fault> {
+        let Some(s) = &self.surfaces else { return Ok(None) };
+        let Some(drawn) = s.pieces.borrow_mut().drawn(&s.drawn, &|b| self.opened.fetch(b))? else { return Ok(None) };
+        let all = surface_distances(camera, pictures, &s.original, &drawn);
+        let claims = self.opened.pipeline.far_field.frame_claims();
+        let claimed = claims.iter().find(|c| c.quantity == Quantity::SurfaceDistancePx);
+        Ok(Some(SurfaceErrors::of(&all, claimed.map(|c| c.max))))
+    }
+
     /// Audits the claims of all built cells at `views` held-out viewpoints over all of them: partition and far field.
     ///
     /// # Errors
     /// What loading and drawing give.
     pub fn audit(&mut self, views: usize, seed: u64) -> Result<Vec<Measured>, Fault> {
         let (tour, opened) = (self.tour, &self.opened);
-        let claims = |id: &CellId| !opened.claims(*id).is_empty() || !opened.built.cells[id].cell.claims.is_empty();
-        let cells: Vec<CellId> = opened.built.cells.keys().copied().filter(claims).collect();
+        let frames: Vec<Claim> = opened.pipeline.far_field.frame_claims();
+        // How far surfaces are off is looked at only where that was asked for.
+        let of_frames = frames.iter().filter(|c| c.quantity != Quantity::SurfaceDistancePx || self.surfaces.is_some());
+        let claims = |id: CellId| opened.claims(id).iter().chain(of_frames.clone()).cloned().collect::<Vec<Claim>>();
+        let claimed = |id: &CellId| !claims(*id).is_empty() || !opened.built.cells[id].cell.claims.is_empty();
+        let cells: Vec<CellId> = opened.built.cells.keys().copied().filter(claimed).collect();
         let each = views.div_ceil(cells.len().max(1));
         let mut out = vec![];
         if cells.is_empty() || views == 0 {
@@ -229,14 +272,18 @@ impl<'a> Walker<'a> {
                 self.device.load(b, tour.scene, &fetch)?;
             }
             let draws = |c: &Camera| opened.far_draws(id, c);
+            let drawn = |d: &[Draw], s: &Surfaces| s.pieces.borrow_mut().drawn(d, &fetch);
+            let truth =
+                self.surfaces.as_ref().map(|s| Truth { original: &s.original, drawn: Box::new(|d| drawn(d, s)) });
             let audit = CellAudit {
                 scene: tour.scene,
                 views: tour.views,
                 cell: &opened.built.cells[&id].cell,
                 cells: &*opened.division.cells,
                 asset: asset_of(id),
-                claims: opened.claims(id),
+                claims: &claims(id),
                 draws: &draws,
+                truth,
             };
             out.extend(audit.sample(&mut *self.device.backend, each, seed)?);
             for b in payloads.into_iter().filter(|&b| !self.residency.has(b)) {

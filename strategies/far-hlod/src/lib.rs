@@ -32,6 +32,7 @@
 mod bake;
 mod cone;
 mod piece;
+mod promise;
 mod rounding;
 mod skeleton;
 mod texture;
@@ -40,6 +41,7 @@ mod view;
 
 use farfield_core::Fault;
 use farfield_core::cell::Cell;
+use farfield_core::claim::{Claim, Quantity};
 use farfield_core::context::Context;
 use farfield_core::id::AssetId;
 use farfield_core::scene::Scene;
@@ -50,6 +52,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+pub use promise::{Promise, promises};
 use skeleton::Skeleton;
 
 const NAME: &str = "point-polygon-hlod";
@@ -167,6 +170,10 @@ impl FarField for PointPolygonHlod {
             }
         }
         Ok(levels)
+    }
+
+    fn frame_claims(&self) -> Vec<Claim> {
+        vec![Claim { quantity: Quantity::SurfaceDistancePx, payload: None, max: self.max_px.into() }]
     }
 
     fn frame_settings(&self) -> &'static [&'static str] {
