@@ -139,6 +139,8 @@ pub struct Level {
     pub nodes: u64,
     /// Triangles of all its nodes; `None` as long as they are not built.
     pub triangles: Option<u64>,
+    /// Points of all its nodes; `None` as long as they are not built.
+    pub points: Option<u64>,
 }
 
 /// A far-field representation: its offline half. Three methods required.

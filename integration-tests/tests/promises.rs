@@ -536,7 +536,7 @@ fn at_the_corner(v: &ViewModel, place: Vec3, to: Vec3, outwards: Vec3, away: f32
 /// Not where chance leads, but where it hurts: the places of a node that are farthest off, seen along the surface, in the corner of a wide picture, from
 /// as near as the node is drawn.
 #[test]
-#[ignore = "fails: what a view tolerates (walk/opened.rs) leaves out that a length is 1 / cos^2 as long beside the picture's middle"]
+
 fn places_in_a_pictures_corner_keep_the_promise() {
     let lab = lab("source = \"asteroid\"\ntriangles = 400_000", "metric = { type = \"hausdorff\" }");
     let opened = lab.opened(0).unwrap();

@@ -318,22 +318,26 @@ fn details(h: &mut String, s: &Summary) {
     }
 }
 
-/// The census of hierarchies: nodes and triangles a level.
+/// The census of hierarchies: nodes, triangles and points a level.
 fn levels(h: &mut String, pipelines: &[PipelineSummary]) {
     if pipelines.iter().all(|p| p.levels.is_empty()) {
         return;
     }
-    *h += "<h2>Levels of detail</h2><table><tr><th>pipeline</th><th>level, coarsest first</th><th>nodes</th><th>triangles</th><th>a node</th></tr>";
+    *h += "<h2>Levels of detail</h2><table><tr><th>pipeline</th><th>level, coarsest first</th><th>nodes</th><th>triangles</th><th>a node</th><th>points</th><th>a node</th></tr>";
     for (p, l) in pipelines.iter().flat_map(|p| p.levels.iter().map(move |l| (p, l))) {
-        let triangles = l.triangles.map_or("-".into(), |t| t.to_string());
-        let mean = l.triangles.map_or("-".into(), |t| format!("{:.0}", t as f64 / l.nodes.max(1) as f64));
+        let all = |n: Option<u64>| n.map_or("-".into(), |n| n.to_string());
+        let mean = |n: Option<u64>| n.map_or("-".into(), |n| format!("{:.0}", n as f64 / l.nodes.max(1) as f64));
         push(
             h,
             format_args!(
-                "<tr><td>{}</td><td>{}</td><td>{}</td><td>{triangles}</td><td>{mean}</td></tr>",
+                "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
                 text(&p.name),
                 l.level,
-                l.nodes
+                l.nodes,
+                all(l.triangles),
+                mean(l.triangles),
+                all(l.points),
+                mean(l.points)
             ),
         );
     }

@@ -136,7 +136,7 @@ mod tests {
             }),
             bounds: vec![],
             left_out: vec![],
-            levels: vec![Level { level: 0, nodes: 3, triangles: Some(1234) }],
+            levels: vec![Level { level: 0, nodes: 3, triangles: Some(1234), points: Some(0) }],
         };
         Summary {
             schema: SCHEMA,

@@ -12,7 +12,7 @@
 
 use farfield_core::Fault;
 use farfield_core::octahedral;
-use farfield_core::payload::{MeshPart, Part, Payload};
+use farfield_core::payload::{MeshPart, Part, Payload, PointsPart};
 use glam::{IVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -84,6 +84,19 @@ pub fn pack(payload: &Payload) -> Result<Vec<u8>, Fault> {
     let mut rest = payload.clone();
     let mut packed: Vec<Option<Packed>> = vec![];
     for part in &mut rest.parts {
+        if let Part::Points(p) = part
+            && [p.normals.len(), p.albedo.len()] == [p.positions.len(); 2]
+        {
+            packed.push(Some(packed_vertices(
+                p.positions.len(),
+                &chain(p.positions.len()),
+                &p.positions,
+                &p.normals,
+                &p.albedo,
+            )?));
+            *p = PointsPart { radius: p.radius, two_sided: p.two_sided, ..PointsPart::default() };
+            continue;
+        }
         let Part::Mesh(m) = part else {
             packed.push(None);
             continue;
@@ -105,8 +118,12 @@ pub fn pack(payload: &Payload) -> Result<Vec<u8>, Fault> {
 pub fn unpack(bytes: &[u8]) -> Result<Payload, Fault> {
     let (mut payload, packed): (Payload, Vec<Option<Packed>>) = decode(bytes)?;
     for (part, packed) in payload.parts.iter_mut().zip(packed) {
-        if let (Part::Mesh(m), Some(p)) = (part, packed) {
-            *m = MeshPart { two_sided: m.two_sided, ..unpacked_mesh(&p)? };
+        match (part, packed) {
+            (Part::Mesh(m), Some(p)) => *m = MeshPart { two_sided: m.two_sided, ..unpacked_mesh(&p)? },
+            (Part::Points(m), Some(p)) => {
+                (m.positions, m.normals, m.albedo) = unpacked_vertices(&p, &chain(p.vertices as usize))?;
+            }
+            _ => {}
         }
     }
     Ok(payload)
@@ -135,16 +152,31 @@ fn packed_mesh(m: &MeshPart) -> Result<Packed, Fault> {
     let coded_indices = coded(meshopt::encode_index_buffer(&indices, vertices))?;
     // The codec turns triangles: predictions go by what comes back.
     let indices: Vec<u32> = coded(meshopt::decode_index_buffer(&coded_indices, indices.len()))?;
+    let packed = packed_vertices(vertices, &indices, &positions, &normals, &albedo)?;
+    Ok(Packed { triangles: (indices.len() / 3) as u32, indices: coded_indices, ..packed })
+}
+
+/// Triangles without area that make each vertex follow the one before.
+fn chain(n: usize) -> Vec<u32> {
+    (0..n as u32).flat_map(|v| [v, v.saturating_sub(1), v.saturating_sub(1)]).collect()
+}
+
+fn packed_vertices(
+    n: usize,
+    indices: &[u32],
+    positions: &[Vec3],
+    normals: &[Vec3],
+    albedo: &[[u8; 4]],
+) -> Result<Packed, Fault> {
     Ok(Packed {
-        vertices: vertices as u32,
-        triangles: (indices.len() / 3) as u32,
-        positions: pack_positions(&positions, &indices)?,
-        normals: pack_normals(&normals, &positions, &indices)?,
-        indices: coded_indices,
+        vertices: n as u32,
+        positions: pack_positions(positions, indices)?,
+        normals: pack_normals(normals, positions, indices)?,
         albedo: match albedo.first() {
             Some(&first) if albedo.iter().all(|a| *a == first) => Albedo::One(first),
-            _ => Albedo::Many(coded(meshopt::encode_vertex_buffer(&albedo))?),
+            _ => Albedo::Many(coded(meshopt::encode_vertex_buffer(albedo))?),
         },
+        ..Packed::default()
     })
 }
 
@@ -162,6 +194,13 @@ fn unpacked_mesh(p: &Packed) -> Result<MeshPart, Fault> {
     if next as usize != n {
         return Err(damaged("a vertex without a triangle"));
     }
+    let (positions, normals, albedo) = unpacked_vertices(p, &indices)?;
+    Ok(MeshPart { positions, normals, albedo, indices, two_sided: false })
+}
+
+/// Positions, normals and albedo of vertices that `indices` use in their order.
+fn unpacked_vertices(p: &Packed, indices: &[u32]) -> Result<(Vec<Vec3>, Vec<Vec3>, Vec<[u8; 4]>), Fault> {
+    let n = p.vertices as usize;
     let floats = |bytes: &[u8]| -> Result<Vec<Vec3>, Fault> {
         Ok(coded(meshopt::decode_vertex_buffer::<[f32; 3]>(bytes, n))?.into_iter().map(Vec3::from).collect())
     };
@@ -177,7 +216,7 @@ fn unpacked_mesh(p: &Packed) -> Result<MeshPart, Fault> {
             let mut off = whole(off, 3 * of_coarse)?.into_iter();
             let mut off_fine = whole(off_fine, 3 * (n - of_coarse))?.into_iter();
             let mut out: Vec<IVec3> = vec![IVec3::ZERO; n];
-            predict(&indices, &mut out, &mut |v, guess, _| {
+            predict(indices, &mut out, &mut |v, guess, _| {
                 let (zeros, off) = if is_coarse(v) { (*zeros, &mut off) } else { (0, &mut off_fine) };
                 let mut next = || off.next().unwrap_or_default();
                 let off = IVec3::new(next(), next(), next());
@@ -193,7 +232,7 @@ fn unpacked_mesh(p: &Packed) -> Result<MeshPart, Fault> {
                 return Err(damaged("its normals"));
             }
             let (bits, off) = (u32::from(*bits), whole(off, 2 * n)?);
-            let guesses = normals_of(&positions, &indices);
+            let guesses = normals_of(&positions, indices);
             let code = |(guess, off): (&Vec3, &[i32])| {
                 let [x, y] = octahedral::code(*guess, bits);
                 octahedral::vector([x.wrapping_add(off[0] as i16), y.wrapping_add(off[1] as i16)], bits)
@@ -205,7 +244,7 @@ fn unpacked_mesh(p: &Packed) -> Result<MeshPart, Fault> {
         Albedo::One(a) => vec![*a; n],
         Albedo::Many(bytes) => coded(meshopt::decode_vertex_buffer(bytes, n))?,
     };
-    Ok(MeshPart { positions, normals, albedo, indices, two_sided: false })
+    Ok((positions, normals, albedo))
 }
 
 fn damaged(what: &str) -> Fault {
@@ -418,6 +457,11 @@ mod tests {
             step in prop::option::of(-20i32..6), rounded: bool, coloured: bool
         ) {
             let m = mesh(places, corners, step.map(|s| (s as f32).exp2()), rounded, coloured);
+            let points = PointsPart {
+                positions: m.positions.clone(), normals: m.normals.clone(), albedo: m.albedo.clone(), radius: 0.5, two_sided: rounded
+            };
+            let cloud = Payload { origin: DVec3::ONE, bounds: Aabb::EMPTY, parts: vec![Part::Points(points)] };
+            prop_assert_eq!(unpack(&pack(&cloud).unwrap()).unwrap(), cloud);
             let payload = Payload { origin: DVec3::ONE, bounds: Aabb::of([Vec3::ONE]), parts: vec![Part::Mesh(m.clone())] };
             let back = unpack(&pack(&payload).unwrap()).unwrap();
             let Part::Mesh(b) = &back.parts[0] else { panic!("no mesh") };

@@ -155,8 +155,9 @@ impl<'a> Opened<'a> {
         f: impl FnOnce(&dyn FarView, &View<'_>) -> R,
     ) -> Option<R> {
         let ((cell, at), far) = (self.active(id, camera)?, self.views.get(&id)?);
-        // Half a pixel, at a box's nearest point: tolerance = distance / (2 px_per_tan).
-        let half_px = |b: &Aabb| 0.5 * b.distance(camera.eye.as_vec3()) / camera.px_per_tan();
+        // Half a pixel, at a box's nearest point and at its farthest from the picture's middle: a length s at distance d and at an angle a covers at most
+        // s / d px_per_tan / cos^2 a.
+        let half_px = |b: &Aabb| 0.5 * b.distance(camera.eye.as_vec3()) / (camera.px_per_tan() * stretch(camera, b));
         let view = View { scene: self.scene, camera, at: &at, tolerance: &half_px, budget, cell: Some(cell) };
         Some(f(&**far, &view))
     }
@@ -226,6 +227,17 @@ impl<'a> Opened<'a> {
         }
         all as f64 / (all - far + simplified).max(1) as f64
     }
+}
+
+/// The largest 1 / cos^2 over the part of a picture that a box's ball covers, at most that of the picture's corner.
+fn stretch(camera: &Camera, b: &Aabb) -> f32 {
+    let (to, radius) = ((b.centre().as_dvec3() - camera.eye).as_vec3(), 0.5 * b.size().length());
+    let (distance, most) = (to.length(), camera.corner_stretch());
+    if radius >= distance {
+        return most;
+    }
+    let angle = to.angle_between(camera.forward) + (radius / distance).asin();
+    if angle < std::f32::consts::FRAC_PI_2 { most.min(angle.cos().powi(-2)) } else { most }
 }
 
 /// A frame as two passes: what is seen, then light.

@@ -4,20 +4,20 @@
 
 use farfield_core::context::{Context, collect};
 use farfield_core::id::LocalPayload;
-use farfield_core::octahedral::{FINE_BITS, rounded};
+use farfield_core::octahedral::rounded;
 use farfield_core::payload::{MeshPart, Part, Payload};
 use farfield_core::scene::{Gathered, gather};
 use farfield_core::strategy::{SceneJob, Sink};
 use farfield_core::{Aabb, Fault};
 use glam::{DVec3, Vec3};
 
-use crate::PointPolygonHlod;
 use crate::cone::Cone;
 use crate::piece::Piece;
 use crate::rounding::Grid;
 use crate::skeleton::{Node, Skeleton};
 use crate::texture;
 use crate::tree::{Borders, Tree};
+use crate::{PointPolygonHlod, Primitives, points};
 
 /// Subtrees whose roots stand this deep are independent jobs: up to 64.
 const PARALLEL_DEPTH: u32 = 2;
@@ -113,7 +113,8 @@ impl Baker<'_> {
         let allowance = self.tree.allowance(node, self.own.resolution);
         let mut piece = Piece::joined(&sources);
         piece.smooth(&self.tree.below(node), allowance);
-        let piece = piece.simplified(&self.tree.below(node), allowance - self.grid.error(), &*self.own.metric)?;
+        let piece =
+            piece.simplified(&self.tree.below(node), allowance - self.grid_of(node).error(), &*self.own.metric)?;
         let roots: Vec<&Node> = below.iter().filter_map(|b| b.nodes.first()).collect();
         let own = self.put(node, &piece, &roots)?;
         let mut nodes = vec![own];
@@ -125,33 +126,84 @@ impl Baker<'_> {
         Ok(Built { piece, children, nodes })
     }
 
+    /// Where positions inside a node are rounded to: parts of what the node may be off by. Those that others share are on the finest grid of all.
+    fn grid_of(&self, node: u32) -> Grid {
+        let step = self.tree.allowance(node, self.own.resolution) / self.own.grid_steps as f32;
+        Grid::at_most(step.max(self.grid.step), self.tree.edge)
+    }
+
+    /// A node's geometry as it is stored.
+    fn rounded(&self, node: u32, piece: &Piece) -> Gathered {
+        let (mut mesh, grid) = (piece.mesh.clone(), self.grid_of(node));
+        for (p, outside) in mesh.positions.iter_mut().zip(piece.outside(&self.tree.below(node))) {
+            *p = if outside { self.grid.round(*p) } else { grid.round(*p) };
+        }
+        mesh.wedges.iter_mut().for_each(|w| w.normal = rounded(w.normal, self.own.normal_bits));
+        mesh
+    }
+
     /// Rounds and stores a node's geometry.
     fn put(&self, node: u32, piece: &Piece, children: &[&Node]) -> Result<Node, Fault> {
-        let mut parts = piece.mesh.parts(&piece.mesh.corners, &piece.mesh.two_sided);
-        for p in &mut parts {
-            p.positions.iter_mut().for_each(|p| *p = self.grid.round(*p));
-            p.normals.iter_mut().for_each(|n| *n = rounded(*n, FINE_BITS));
-        }
+        let grid = self.grid_of(node);
+        let round = |positions: &mut [Vec3], normals: &mut [Vec3]| {
+            positions.iter_mut().for_each(|p| *p = grid.round(*p));
+            normals.iter_mut().for_each(|n| *n = rounded(*n, self.own.normal_bits));
+        };
+        let mesh = &self.rounded(node, piece);
+        // Cones are of all triangles, drawn as such or as points.
+        let mut parts = mesh.parts(&mesh.corners, &mesh.two_sided);
         let cones: Vec<Cone> = children.iter().map(|c| c.cone).collect();
         let cone = if parts.iter().any(|p| p.two_sided) { Cone::ALL } else { cone(piece, &parts, &cones) };
         let local = |p: &Vec3| (self.origin + p.as_dvec3()).as_vec3();
         let bounds = Aabb::of(parts.iter().flat_map(|p| &p.positions).map(local));
         let whole = children.iter().map(|c| c.bounds).fold(bounds, Aabb::union);
         let whole = whole.union(self.tree.octree.nodes[node as usize].loose);
+        let error = piece.error + grid.error();
+        // Points alone are as far apart as the node's error may be; then they are what it is.
+        let error = if self.own.primitives == Primitives::Points {
+            error.max(self.tree.allowance(node, self.own.resolution))
+        } else {
+            error
+        };
+        let split = match self.own.primitives {
+            Primitives::Triangles => None,
+            p => Some(points::split(mesh, error, p == Primitives::Points, self.own.point_cost)),
+        };
+        let mut splats = vec![];
+        if let Some(split) = split.filter(|s| !s.points.is_empty()) {
+            let kept = &split.kept;
+            let corners: Vec<_> = kept.iter().map(|&t| mesh.corners[t as usize]).collect();
+            let two_sided: Vec<_> = kept.iter().map(|&t| mesh.two_sided[t as usize]).collect();
+            parts = mesh.parts(&corners, &two_sided);
+            splats = split.points;
+            for p in &mut splats {
+                round(&mut p.positions, &mut p.normals);
+                p.radius += grid.error();
+            }
+        }
+        let triangles = parts.iter().map(|p| p.indices.len() as u32 / 3).sum();
+        let points = splats.iter().map(|p| p.positions.len() as u32).sum();
+        let parts = parts.into_iter().map(Part::Mesh).chain(splats.into_iter().map(Part::Points));
+        let parts: Vec<Part> = parts.collect();
+        let bytes = |p: &Part| match p {
+            Part::Mesh(m) => m.bytes(),
+            Part::Points(p) => p.bytes(),
+            _ => 0,
+        };
         let own = Node {
             bounds: whole,
-            error: piece.error + self.grid.error(),
+            error,
             cone,
             end: self.tree.below(node).end,
             depth: self.tree.octree.nodes[node as usize].depth as u8,
             parts: parts.len() as u8,
-            triangles: piece.mesh.corners.len() as u32,
-            bytes: parts.iter().map(MeshPart::bytes).sum(),
+            triangles,
+            points,
+            bytes: parts.iter().map(bytes).sum(),
             object: most(&piece.mesh) + 1,
             chunks: vec![],
         };
         if !parts.is_empty() {
-            let parts = parts.into_iter().map(Part::Mesh).collect();
             self.out.put(LocalPayload(node), &Payload { origin: self.origin, bounds, parts })?;
         }
         Ok(own)

@@ -23,6 +23,8 @@
 //! * Textures: vertices carry albedo alone. Where a texture shows more, the distance to the nearest corner counts as error, so that original
 //!   chunks, which stand below the leaves, are drawn close by.
 //!
+//! * Points: see the file `points`.
+//!
 //! Limits: seams (vertices with several normals or albedos) stay at every level, so models that consist of hard edges are hardly
 //! simplified; parts that are not connected never join nor vanish.
 //!
@@ -32,6 +34,7 @@
 mod bake;
 mod cone;
 mod piece;
+mod points;
 mod promise;
 mod rounding;
 mod skeleton;
@@ -81,10 +84,36 @@ pub struct PointPolygonHlod {
     #[serde(default = "grid_steps")]
     #[schemars(range(min = 1))]
     pub grid_steps: u32,
+    /// What nodes are drawn as.
+    #[serde(default)]
+    pub primitives: Primitives,
+    /// What a point costs to draw: points replace the small triangles of a node where they are cheaper. The default is that of a software
+    /// rasteriser on a processor; the benchmark of primitives measures a backend's.
+    #[serde(default = "point_cost")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "unit" = "triangles"))]
+    pub point_cost: f32,
+    /// Bits of each of the two numbers of a stored normal; 11 turn it by less than half a grey level of shading.
+    #[serde(default = "normal_bits")]
+    #[schemars(range(min = 8, max = 11))]
+    pub normal_bits: u32,
     /// A difference between a texture and the albedo of its triangle's corners, in any channel, that does not count; 255 lets textures go.
     #[serde(default = "max_albedo_off")]
     #[schemars(extend("unit" = "grey levels"))]
     pub max_albedo_off: u8,
+}
+
+/// What nodes are drawn as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Primitives {
+    /// Small triangles as points where that is cheaper.
+    #[default]
+    Mixed,
+    /// Triangles only.
+    Triangles,
+    /// Points only, as far apart as the node's error may be: up to twice the square of `resolution` a node. Original chunks, close by, stay
+    /// triangles.
+    Points,
 }
 
 fn node_triangles() -> u64 {
@@ -103,6 +132,13 @@ fn max_px() -> f32 {
 fn grid_steps() -> u32 {
     8
 }
+/// Measured on lavapipe.
+fn point_cost() -> f32 {
+    1.5
+}
+fn normal_bits() -> u32 {
+    10
+}
 fn max_albedo_off() -> u8 {
     16
 }
@@ -118,6 +154,12 @@ impl PointPolygonHlod {
         }
         if !(self.max_px.is_finite() && self.max_px >= 0.0) {
             return refuse(format!("max_px = {} is not a length", self.max_px));
+        }
+        if !(self.point_cost.is_finite() && self.point_cost > 0.0) {
+            return refuse(format!("point_cost = {} is no ratio of costs", self.point_cost));
+        }
+        if !(8..=11).contains(&self.normal_bits) {
+            return refuse(format!("normal_bits = {} is not between 8 and 11", self.normal_bits));
         }
         if !self.metric.bounds_distance() {
             return refuse(
@@ -150,18 +192,20 @@ impl FarField for PointPolygonHlod {
 
     fn census(&self, scene: &Scene, shared: Option<&[u8]>) -> Result<Vec<Level>, Fault> {
         let mut levels: Vec<Level> = vec![];
-        let mut count = |depth: u32, triangles: Option<u64>| {
+        let mut count = |depth: u32, drawn: Option<[u32; 2]>| {
             while levels.len() <= depth as usize {
-                levels.push(Level { level: levels.len() as u32, nodes: 0, triangles: triangles.map(|_| 0) });
+                let none = drawn.map(|_| 0);
+                levels.push(Level { level: levels.len() as u32, nodes: 0, triangles: none, points: none });
             }
             let own = &mut levels[depth as usize];
             own.nodes += 1;
-            own.triangles = own.triangles.zip(triangles).map(|(a, b)| a + b);
+            own.triangles = own.triangles.zip(drawn).map(|(all, [n, _])| all + u64::from(n));
+            own.points = own.points.zip(drawn).map(|(all, [_, n])| all + u64::from(n));
         };
         match shared {
             Some(bytes) => {
                 let skeleton = Skeleton::decode(NAME, bytes)?;
-                skeleton.nodes.iter().for_each(|n| count(n.depth.into(), Some(n.triangles.into())));
+                skeleton.nodes.iter().for_each(|n| count(n.depth.into(), Some([n.triangles, n.points])));
             }
             None => {
                 self.check()?;

@@ -62,7 +62,7 @@ impl Piece {
     }
 
     /// Whether each vertex is used outside the leaves `own`.
-    fn outside(&self, own: &Range<u32>) -> impl Iterator<Item = bool> {
+    pub(crate) fn outside(&self, own: &Range<u32>) -> impl Iterator<Item = bool> {
         self.spans.iter().map(|s| !own.contains(&s[0]) || !own.contains(&s[1]))
     }
 

@@ -23,6 +23,8 @@ pub(crate) struct Node {
     pub(crate) parts: u8,
     /// Triangles of its payload.
     pub(crate) triangles: u32,
+    /// Points of its payload.
+    pub(crate) points: u32,
     /// Bytes of its payload in memory.
     pub(crate) bytes: u64,
     /// What the object plane says: the object of most of its triangles, plus 1.
