@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Fault;
 use crate::draw::DrawList;
+use crate::extent::{Extent, Takes};
 use crate::id::{Block, TargetId};
 use crate::image::{Picture, SurfaceImage};
 use crate::mesh::ChunkMesh;
@@ -64,6 +65,21 @@ pub trait Backend {
     /// # Errors
     /// [`Fault::Device`] where the device refuses the memory, [`Fault::Data`] where the block contradicts itself.
     fn upload(&mut self, block: Block, data: &BlockData<'_>) -> Result<u64, Fault>;
+
+    /// What a block of this extent takes, never less than [`Backend::upload`] will take; known before it is read. By default that of a
+    /// rasteriser: packed once on the device, and three copies on their way (packed, to be written, in the driver's hands).
+    fn takes(&self, extent: &Extent) -> Takes {
+        let resident_bytes = extent.packed_bytes();
+        Takes { resident_bytes, passing_bytes: 3 * resident_bytes }
+    }
+
+    /// Waits until nothing of what was uploaded is on its way any more, so that only the blocks themselves take memory.
+    ///
+    /// # Errors
+    /// [`Fault::Device`] where the device fails.
+    fn settle(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
 
     /// Frees a block; one that is not there is no error.
     fn release(&mut self, block: Block);

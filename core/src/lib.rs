@@ -20,6 +20,7 @@ pub mod color;
 pub mod context;
 pub mod covered;
 pub mod draw;
+pub mod extent;
 pub mod fault;
 pub mod id;
 pub mod image;

@@ -80,6 +80,9 @@ pub struct PipelineSummary {
     pub texture_bytes: u64,
     /// Payload and geometry blocks resident, bytes, at most.
     pub resident_bytes: u64,
+    /// What was held at most, under which limit, and what could not be had.
+    #[serde(default)]
+    pub memory: MemoryUse,
     /// Frames whose eye was in no cell: plain geometry was drawn.
     pub frames_outside_cells: usize,
     /// Original triangles over triangles drawn in a cell, near and far together, not culled to the frustum; mean over the
@@ -95,6 +98,30 @@ pub struct PipelineSummary {
     /// Levels of detail, where there is a hierarchy of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<Level>,
+}
+
+/// What a walk held of blocks, original chunks and payloads alike, and what it could not have. Audits, which come after it and draw
+/// everything, are not counted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MemoryUse {
+    /// `[budget] memory_bytes`; none for the reference.
+    pub limit_bytes: Option<u64>,
+    /// The most at any moment, bytes: blocks on the device, blocks read and waiting with the place kept for them, a block being read, a block
+    /// being uploaded.
+    pub peak_bytes: u64,
+    /// What the smallest of all blocks takes while it is loaded, bytes: under a limit below that nothing is drawn.
+    pub smallest_block_bytes: u64,
+    /// What the largest takes: under a limit below that it never comes.
+    pub largest_block_bytes: u64,
+    /// Blocks that never fit the limit.
+    pub blocks_too_large: u64,
+    /// Reads that failed; each block is tried three times.
+    pub failed_reads: u64,
+    /// Blocks that were given up.
+    pub blocks_given_up: u64,
+    /// All that in words, with files and blocks; at most a hundred lines.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub troubles: Vec<String>,
 }
 
 /// What building cost.
@@ -256,6 +283,10 @@ pub struct FrameRow {
     pub lines: u64,
     /// Far blocks that were not resident.
     pub missing_blocks: u32,
+    /// The error that its far field believes in, pixels.
+    pub far_error_px: f32,
+    /// Reads of blocks that failed.
+    pub failed_reads: u64,
     /// Bytes of blocks that the scheduler had uploaded for it.
     pub uploaded_bytes: u64,
     /// Texels resident, bytes.

@@ -303,6 +303,9 @@ impl One<'_> {
         if let Some(scene) = self.surface {
             walker.compare_surfaces(scene);
         }
+        if self.is_reference() {
+            walker = walker.strict();
+        }
         let metrics = Metrics { ssim: e.measure.ssim, flip: e.measure.flip };
         let (mut walked, mut rows, mut errors): (Vec<Walked>, Vec<FrameRow>, Vec<FrameErrors>) =
             (vec![], vec![], vec![]);
@@ -346,6 +349,8 @@ impl One<'_> {
         }
         bar.done();
         let measured = walker.audit(e.measure.audit_views, AUDIT_SEED).map_err(failed(p.cameras.len()))?;
+        let memory = walker.memory();
+        memory.troubles.iter().for_each(|line| (self.options.say)(&format!("pipeline \"{name}\": {line}")));
         let of = |pick: fn(&Walked) -> u64| MeanMax::of(walked.iter().map(|w| pick(w) as f64));
         let times: Vec<f64> = walked.iter().map(|w| w.frame_ms).collect();
         let ratios: Vec<f64> =
@@ -372,6 +377,7 @@ impl One<'_> {
             lines: of(|w| w.lines),
             texture_bytes: walked.iter().map(|w| w.texture_bytes).max().unwrap_or(0),
             resident_bytes: walked.iter().map(|w| w.resident_bytes).max().unwrap_or(0),
+            memory,
             frames_outside_cells: walked.iter().filter(|w| w.cell.is_none()).count(),
             original_over_simplified: MeanMax::of(ratios).mean,
             error: (!self.is_reference()).then(|| measure::summary(&errors, &changes)),
@@ -411,6 +417,8 @@ fn row(pipeline: &str, frame: usize, w: &Walked) -> FrameRow {
         points: w.samples + w.points,
         lines: w.lines,
         missing_blocks: w.missing,
+        far_error_px: w.far_error_px,
+        failed_reads: w.failed_reads,
         uploaded_bytes: w.uploaded_bytes,
         texture_bytes: w.texture_bytes,
         ..FrameRow::default()

@@ -80,6 +80,11 @@ impl Lab {
         Opened::new(p, division, built.remove(0), &self.prepared.scene, &self.store).map_err(|f| told(&f))
     }
 
+    /// The folder of its store.
+    pub fn store(&self) -> &Path {
+        self.store.root()
+    }
+
     /// A device with the scene resident.
     ///
     /// # Errors

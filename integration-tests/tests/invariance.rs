@@ -36,11 +36,14 @@ fn experiment(scale: f64, offset: f64) -> String {
             EDGE * scale
         )
     };
+    let alone = |name: &str, far_field: &str, more: &str| {
+        format!("[[pipeline]]\nname = \"{name}\"\nfar_field = {{ type = \"{far_field}\", {more} }}\n")
+    };
     format!(
         "[scene]\npath = \"stones.glb\"\nscale = {scale:?}\noffset = [{offset:?}, {:?}, {:?}]\n\
          [view]\nresolution = [160, 120]\neye_height = [{eye:?}, {eye:?}]\nnear = {:?}\npath = \"line\"\nframes = 9\n\
          max_speed = {:?}\nframes_per_s = 10\n\
-         [[pipeline]]\nname = \"all geometry\"\nfar_field = {{ type = \"geometry\", frustum_culling = false }}\n{}{}{}{}",
+         [[pipeline]]\nname = \"all geometry\"\nfar_field = {{ type = \"geometry\", frustum_culling = false }}\n{}{}{}{}{}{}",
         -offset,
         0.5 * offset,
         0.05 * scale,
@@ -49,6 +52,8 @@ fn experiment(scale: f64, offset: f64) -> String {
         hybrid("several views", "view_test = { type = \"self-occlusion\", max_px = 0.0 }"),
         hybrid("quadric", "collapse = { type = \"quadric\" }"),
         hybrid("appearance", "collapse = { type = \"appearance\" }"),
+        alone("clusters", "cluster-lod", "cluster_triangles = 32, group_clusters = 8, max_px = 1.0"),
+        alone("nodes", "point-polygon-hlod", "node_triangles = 500, resolution = 64, max_px = 1.0"),
         eye = 1.5 * scale,
     )
 }

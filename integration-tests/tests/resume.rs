@@ -10,9 +10,10 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use farfield_experiments::config;
+use farfield_experiments::config::{self, BackendName};
 use farfield_experiments::run::{self, Options};
-use farfield_integration_tests::lab::told;
+use farfield_experiments::walk::Opened;
+use farfield_integration_tests::lab::{Lab, told};
 use farfield_integration_tests::stones;
 
 const PIPELINES: &str = r#"
@@ -128,6 +129,34 @@ fn one_thread_and_two_leave_the_same_bytes() {
     f.build("one", 1);
     f.build("two", 2);
     same(&tree(&f.store("two")), &tree(&f.store("one")));
+}
+
+/// What only frames depend on is no part of a key: another bound on the error on screen draws other nodes of the same bake.
+#[test]
+fn a_sweep_of_a_frame_setting_does_not_bake_again() {
+    let folder = stones::folder();
+    let one = |max_px: f64| {
+        format!(
+            "[[pipeline]]\nname = \"{max_px}\"\nbackend = \"cpu\"\n\
+             far_field = {{ type = \"static-lod\", max_px = {max_px:?}, max_albedo_off = 64 }}\n"
+        )
+    };
+    let text = stones::experiment([160, 120], &(one(0.5) + &one(64.0)));
+    let lab = Lab::new(&text, folder.path()).unwrap();
+    let built = |i: usize| {
+        let what = |o: &Opened<'_>| (o.built.shared.as_ref().map(|s| s.0), o.built.preprocess.seconds);
+        lab.with(i, what).unwrap()
+    };
+    let (first, second) = (built(0), built(1));
+    assert!(first.0.is_some() && first.1 > 0.0, "nothing is baked: {first:?}");
+    assert_eq!(second, (first.0, 0.0), "it is baked again");
+    let mut device = lab.device(BackendName::Cpu).unwrap();
+    let mut drawn = |i: usize| {
+        let frames = lab.frames(i, &[0, 1, 3], &mut device).unwrap();
+        frames.iter().map(|f| f.near_triangles + f.far_triangles).sum::<u64>()
+    };
+    let (fine, coarse) = (drawn(0), drawn(1));
+    assert!(0 < coarse && coarse < fine, "{coarse} triangles at 64 px, {fine} at half a pixel");
 }
 
 #[test]

@@ -7,11 +7,12 @@ use std::time::Instant;
 use farfield_core::Fault;
 use farfield_core::backend::{Backend, BlockData, Counted, DeviceInfo};
 use farfield_core::draw::{DrawList, Pass, PassKind};
+use farfield_core::extent::{Extent, Takes};
 use farfield_core::id::{Block, TargetId};
 use farfield_core::image::{Picture, SurfaceImage};
 use farfield_core::scene::Scene;
 
-use crate::block::Ready;
+use crate::block::{Ready, takes};
 use crate::frame::{Blocks, Frame};
 use crate::tables::Tables;
 use crate::warp::SplatOrder;
@@ -110,6 +111,10 @@ impl Backend for CpuBackend {
         let bytes = ready.bytes();
         self.blocks.insert(block, Arc::new(ready));
         Ok(bytes)
+    }
+
+    fn takes(&self, extent: &Extent) -> Takes {
+        takes(extent)
     }
 
     fn release(&mut self, block: Block) {

@@ -3,12 +3,16 @@
 use farfield_core::Fault;
 use farfield_core::backend::{BlockData, validate};
 use farfield_core::bvh::TriangleBvh;
+use farfield_core::extent::{Extent, Takes};
 use farfield_core::id::Block;
 use farfield_core::image::octahedral;
 use farfield_core::layered::LayeredPart;
 use farfield_core::mesh::ChunkMesh;
 use farfield_core::payload::{AtlasPart, LinesPart, MeshPart, Part, PointsPart, Projector};
 use glam::{DVec3, Vec2, Vec3};
+
+/// What building a hierarchy takes for a while, bytes a triangle: boxes, a binary tree twice, and the tree between it and the wide one.
+const BUILD_BYTES: u64 = 640;
 
 /// Triangles with attributes.
 pub(crate) struct Surface {
@@ -99,6 +103,24 @@ impl Surface {
 fn vertices(positions: &[Vec3], normals: &[Vec3], albedo: &[[u8; 4]]) -> Vec<Vertex> {
     let all = positions.iter().zip(normals).zip(albedo);
     all.map(|((&position, &normal), &albedo)| Vertex { position, normal: octahedral(normal), albedo }).collect()
+}
+
+/// At most what a block takes. A triangle: three indices, three vertices and a number in the hierarchy, at worst a node of 128 bytes; while
+/// the hierarchy is built at most [`BUILD_BYTES`] more.
+pub(crate) fn takes(e: &Extent) -> Takes {
+    let resident_bytes = (12 + 48 + 4 + 128) * e.triangles
+        + 24 * e.chunk_vertices
+        + 16 * e.vertices
+        + 4 * e.projected_triangles
+        + size_of::<Projector>() as u64 * e.projectors
+        + 8 * (e.texels + e.lines)
+        + e.pixels
+        + 10 * e.samples
+        + 4 * e.objects
+        + size_of::<Vertex>() as u64 * (e.points + e.line_vertices)
+        + size_of::<ReadyPart>() as u64 * e.parts
+        + size_of::<Ready>() as u64;
+    Takes { resident_bytes, passing_bytes: BUILD_BYTES * e.triangles }
 }
 
 impl Ready {

@@ -170,6 +170,13 @@ impl Backend for WgpuBackend {
         Ok(placement.bytes)
     }
 
+    fn settle(&mut self) -> Result<(), Fault> {
+        self.on_the_way_bytes = 0;
+        self.gpu.queue.submit([]);
+        self.gpu.wait()?;
+        self.gpu.check()
+    }
+
     fn release(&mut self, block: Block) {
         self.residency.release(block);
         if let Block::Payload(id) = block {

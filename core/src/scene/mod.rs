@@ -171,6 +171,14 @@ pub trait Geometry: Send + Sync {
     /// # Errors
     /// [`Fault::Data`] where the chunk cannot be read.
     fn with(&self, id: MeshChunkId, f: &mut dyn FnMut(&ChunkMesh)) -> Result<(), Fault>;
+
+    /// Bytes that the chunk takes while [`Geometry::with`] reads it; by default 0, for what is in memory and not read.
+    fn read_bytes(&self, _id: MeshChunkId) -> u64 {
+        0
+    }
+
+    /// Lets go of chunks that were read and are not in use: for callers that keep their own. By default nothing.
+    fn let_go(&self) {}
 }
 
 /// Geometry in memory.

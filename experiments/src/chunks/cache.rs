@@ -108,6 +108,15 @@ impl<V> Cache<V> {
         self.lock().peak_bytes
     }
 
+    /// Drops all values that nobody uses.
+    pub fn let_go(&self) {
+        let mut state = self.lock();
+        while let Some((_, key)) = state.idle.pop_first() {
+            state.drop_idle(key);
+        }
+        self.changed.notify_all();
+    }
+
     /// The value with this number, loaded where it is not held. It takes `held_bytes`, and `extra_bytes` more while it is loaded.
     /// Of several threads that ask for one value, one loads it.
     ///
@@ -184,10 +193,15 @@ impl<V> State<V> {
     fn make_room(&mut self, bytes: u64, limit_bytes: u64) -> bool {
         while self.bytes + bytes > limit_bytes {
             let Some((_, key)) = self.idle.pop_first() else { return false };
-            if let Some(Slot::Held { bytes, .. }) = self.slots.remove(&key) {
-                self.bytes -= bytes;
-            }
+            self.drop_idle(key);
         }
         true
+    }
+
+    /// Drops a value that is idle no longer.
+    fn drop_idle(&mut self, key: u32) {
+        if let Some(Slot::Held { bytes, .. }) = self.slots.remove(&key) {
+            self.bytes -= bytes;
+        }
     }
 }

@@ -158,4 +158,14 @@ impl Geometry for ChunkFile {
         f(&chunk);
         Ok(())
     }
+
+    fn read_bytes(&self, id: MeshChunkId) -> u64 {
+        let info = self.kept.meshes.get(id.mesh.index()).and_then(|m| m.chunks.get(id.chunk as usize));
+        let block = self.kept.blocks.get(id.mesh.index()).and_then(|b| b.get(id.chunk as usize));
+        info.zip(block).map_or(0, |(info, block)| format::held_bytes(info, block) + block.bytes)
+    }
+
+    fn let_go(&self) {
+        self.cache.let_go();
+    }
 }

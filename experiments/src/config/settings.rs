@@ -224,7 +224,8 @@ pub struct ReferenceSettings {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct BudgetSettings {
-    /// Most bytes of geometry and payloads resident on the device; without it all that is wanted.
+    /// Most bytes that a walk ever holds of geometry and payloads: on the device, read and waiting, being read, being uploaded. What does not fit is
+    /// missing, and counted. Without it all that is wanted; the reference is never limited.
     #[schemars(range(min = 1), extend("unit" = "bytes"))]
     pub memory_bytes: Option<u64>,
     /// Most bytes that a frame uploads of what the scheduler asks for, but always one block; the rest follows in later

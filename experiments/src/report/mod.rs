@@ -127,6 +127,7 @@ mod tests {
             lines: MeanMax::default(),
             texture_bytes: 0,
             resident_bytes: 0,
+            memory: MemoryUse::default(),
             frames_outside_cells: 0,
             original_over_simplified: 0.0,
             error: psnr.map(|d| ErrorSummary {

@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use farfield_core::Fault;
 use farfield_core::claim::Claim;
+use farfield_core::extent::Extent;
 use farfield_core::id::LocalPayload;
 use farfield_core::payload::Payload;
 use farfield_core::strategy::{LeftOut, Sink};
@@ -20,6 +21,10 @@ pub struct Stored {
     pub key: Key,
     /// Its file's size, bytes.
     pub bytes: u64,
+    /// Its bytes before compression.
+    pub raw_bytes: u64,
+    /// What it holds.
+    pub extent: Extent,
     /// Triangles in it.
     pub triangles: u64,
     /// Bytes of its texels.
@@ -82,8 +87,11 @@ impl<'a> Recorder<'a> {
 impl Sink for Recorder<'_> {
     fn put(&self, id: LocalPayload, payload: &Payload) -> Result<(), Fault> {
         let key = key("payload", &[&self.asset, &id.0.to_le_bytes()]);
-        let bytes = self.store.put(&key, &pack(payload)?).map_err(|e| stored(&e))?;
-        let made = Stored { key, bytes, triangles: payload.triangles(), texture_bytes: payload.texture_bytes() };
+        let raw = pack(payload)?;
+        let bytes = self.store.put(&key, &raw).map_err(|e| stored(&e))?;
+        let (triangles, texture_bytes) = (payload.triangles(), payload.texture_bytes());
+        let (raw_bytes, extent) = (raw.len() as u64, Extent::of_payload(payload));
+        let made = Stored { key, bytes, raw_bytes, extent, triangles, texture_bytes };
         let mut m = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         match m.payloads.insert(id, made) {
             None => Ok(()),

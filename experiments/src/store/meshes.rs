@@ -123,10 +123,46 @@ pub fn unpack(bytes: &[u8]) -> Result<Payload, Fault> {
             (Part::Points(m), Some(p)) => {
                 (m.positions, m.normals, m.albedo) = unpacked_vertices(&p, &chain(p.vertices as usize))?;
             }
-            _ => {}
+            (part, _) => fit(part),
         }
     }
+    payload.parts.shrink_to_fit();
     Ok(payload)
+}
+
+/// Gives back what arrays have grown beyond their length.
+fn fit(part: &mut Part) {
+    let mesh = |m: &mut MeshPart| {
+        [&mut m.positions, &mut m.normals].into_iter().for_each(Vec::shrink_to_fit);
+        m.albedo.shrink_to_fit();
+        m.indices.shrink_to_fit();
+    };
+    match part {
+        Part::Mesh(m) => mesh(m),
+        Part::Projected(p) => {
+            mesh(&mut p.mesh);
+            p.views.shrink_to_fit();
+            p.projectors.shrink_to_fit();
+        }
+        Part::Atlas(a) => [&mut a.albedo, &mut a.normal].into_iter().for_each(Vec::shrink_to_fit),
+        Part::Layered(l) => {
+            l.counts.shrink_to_fit();
+            l.depth.shrink_to_fit();
+            l.albedo.shrink_to_fit();
+            l.normal.shrink_to_fit();
+            l.object.shrink_to_fit();
+            l.objects.shrink_to_fit();
+        }
+        Part::Points(p) => {
+            [&mut p.positions, &mut p.normals].into_iter().for_each(Vec::shrink_to_fit);
+            p.albedo.shrink_to_fit();
+        }
+        Part::Lines(l) => {
+            [&mut l.positions, &mut l.normals].into_iter().for_each(Vec::shrink_to_fit);
+            l.albedo.shrink_to_fit();
+            l.indices.shrink_to_fit();
+        }
+    }
 }
 
 fn coded<T>(result: meshopt::Result<T>) -> Result<T, Fault> {

@@ -10,10 +10,11 @@ mod memo;
 mod meshes;
 
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use farfield_core::Fault;
 pub use keys::{Key, key};
 pub use manifest::{Manifest, Recorder, Stored, decode, encode};
 pub use memo::StoreMemo;
@@ -77,6 +78,30 @@ impl Store {
             Ok(raw) => Some(raw),
             Err(e) => self.damaged(key, &e.to_string()),
         }
+    }
+
+    /// A block that was stored with these sizes (file, before compression): for run time, where nothing is built and nothing removed.
+    /// Takes no more memory than the two together, whatever the file holds.
+    ///
+    /// # Errors
+    /// The file and what is wrong with it: absent, unreadable, of another size, a checksum that fails.
+    pub fn read(&self, key: &Key, file_bytes: u64, raw_bytes: u64) -> Result<Vec<u8>, Fault> {
+        let path = self.file(key);
+        let bad = |cause: String| Fault::Data { place: path.display().to_string(), cause };
+        let mut file = File::open(&path).map_err(|e| bad(format!("it cannot be opened: {e}")))?;
+        let found = file.metadata().map_err(|e| bad(format!("it cannot be read: {e}")))?.len();
+        if found != file_bytes || file_bytes < HEADER as u64 {
+            return Err(bad(format!("it has {found} bytes; {file_bytes} were stored")));
+        }
+        let mut bytes = vec![0; file_bytes as usize];
+        file.read_exact(&mut bytes).map_err(|e| bad(format!("its {file_bytes} bytes cannot be read: {e}")))?;
+        if &bytes[..4] != MAGIC || checksum(&bytes[4..12], &bytes[HEADER..]) != bytes[12..HEADER] {
+            return Err(bad("its checksum fails".into()));
+        }
+        if bytes[4..12] != raw_bytes.to_le_bytes() {
+            return Err(bad(format!("it does not hold the {raw_bytes} bytes that were stored")));
+        }
+        zstd::bulk::decompress(&bytes[HEADER..], raw_bytes as usize).map_err(|e| bad(e.to_string()))
     }
 
     /// The size of a block's file where it is there and its checksum holds.

@@ -5,12 +5,14 @@
 //! pictures wait in a temporary folder for those that are compared with them.
 
 pub mod device;
+mod loading;
 mod on_demand;
 mod opened;
 mod reference;
 mod residency;
+mod trouble;
 
-use std::cell::RefCell;
+use std::collections::BTreeSet;
 
 use farfield_core::backend::Backend;
 use farfield_core::camera::ViewModel;
@@ -19,18 +21,20 @@ use farfield_core::draw::{Draw, Shading};
 use farfield_core::id::{Block, CellId};
 use farfield_core::image::SurfaceImage;
 use farfield_core::scene::Scene;
-use farfield_core::strategy::{Motion, Planner};
+use farfield_core::strategy::Planner;
 use farfield_core::{Camera, Fault};
 
 pub use on_demand::OnDemand;
 pub use opened::{Drawn, Opened, frame};
 pub use reference::References;
-pub use residency::{Device, Residency};
+pub use residency::{Cost, Device, Residency};
+pub use trouble::{TRIES, Trouble};
 
 use crate::audit::{CellAudit, Measured, Truth};
 use crate::config::{BudgetSettings, MeasureSettings};
 use crate::measure::{Pieces, Rendered, Surface, SurfaceErrors, surface_distances};
-use opened::{PICTURE, SURFACE, Wants, asset_of};
+use crate::results::MemoryUse;
+use opened::{PICTURE, SURFACE, asset_of};
 
 /// What all walks of an experiment share.
 pub struct Tour<'a> {
@@ -57,6 +61,20 @@ pub struct Walker<'a> {
     device: &'a mut Device,
     residency: Residency,
     planner: Box<dyn Planner>,
+    trouble: Trouble,
+    limit: Option<u64>,
+    /// What has to stay free so that any block can come, bytes.
+    headroom: u64,
+    /// Payloads that `headroom` speaks of.
+    sized: usize,
+    /// Blocks that never fit the limit.
+    too_large: u64,
+    /// What the smallest and the largest block take while they are loaded, bytes.
+    smallest: u64,
+    largest: u64,
+    /// Cells that were built again.
+    rebuilt: BTreeSet<CellId>,
+    strict: bool,
     upload_bytes_per_frame: Option<u64>,
     last: Option<Camera>,
     frames: usize,
@@ -91,7 +109,11 @@ pub struct Walked {
     pub lines: u64,
     /// Blocks not there.
     pub missing: u32,
-    /// Bytes that the scheduler had uploaded for it, by the far field's own account of its blocks.
+    /// The error that its far field believes in, pixels.
+    pub far_error_px: f32,
+    /// Reads that failed, of what it asked for and of what the one before asked for.
+    pub failed_reads: u64,
+    /// Bytes that the scheduler had uploaded for it: what its blocks take on the device at most.
     pub uploaded_bytes: u64,
     /// Bytes resident.
     pub resident_bytes: u64,
@@ -108,8 +130,13 @@ impl<'a> Walker<'a> {
         device: &'a mut Device,
         budget: &BudgetSettings,
     ) -> Self {
-        device.free_payloads();
-        Self {
+        // The next pipeline has its own payloads; chunks may stay, but under a limit everything there has to be its own.
+        if budget.memory_bytes.is_some() {
+            device.free_all();
+        } else {
+            device.free_payloads();
+        }
+        let mut walker = Self {
             planner: opened.pipeline.scheduler.start(),
             tour,
             opened,
@@ -117,10 +144,21 @@ impl<'a> Walker<'a> {
             device,
             residency: Residency::new(budget.memory_bytes),
             upload_bytes_per_frame: budget.upload_bytes_per_frame,
+            trouble: Trouble::default(),
+            limit: budget.memory_bytes,
+            headroom: 0,
+            sized: 0,
+            too_large: 0,
+            smallest: 0,
+            largest: 0,
+            rebuilt: BTreeSet::new(),
+            strict: false,
             last: None,
             frames: 0,
             surfaces: None,
-        }
+        };
+        walker.size_up();
+        walker
     }
 
     /// From here on surfaces can be compared with that of the scene.
@@ -129,49 +167,42 @@ impl<'a> Walker<'a> {
         self.surfaces = Some(Surfaces { original: pieces.original(), pieces: RefCell::new(pieces), drawn: vec![] });
     }
 
-    /// Loads what a frame needs: its near chunks, then what the scheduler plans; the bytes of the latter.
-    fn load(&mut self, camera: &Camera, cell: Option<CellId>) -> Result<u64, Fault> {
-        let (scene, opened) = (self.tour.scene, &self.opened);
-        let fetch = |b: Block| opened.fetch(b);
-        self.residency.tick();
-        for c in opened.near(cell, camera).iter() {
-            let block = Block::Chunk(scene.chunks[c.index()].source);
-            self.residency.hold(self.device, block, false, 0, scene, &fetch)?;
+    /// Nothing may be missing: a block that cannot be read stops the walk.
+    pub fn strict(self) -> Self {
+        Self { strict: true, ..self }
+    }
+
+    /// What could not be had so far.
+    pub fn trouble(&self) -> &Trouble {
+        &self.trouble
+    }
+
+    /// Memory so far, and what could not be had.
+    pub fn memory(&self) -> MemoryUse {
+        MemoryUse {
+            limit_bytes: self.limit,
+            peak_bytes: self.residency.peak_bytes,
+            smallest_block_bytes: self.smallest,
+            largest_block_bytes: self.largest,
+            blocks_too_large: self.too_large,
+            failed_reads: self.trouble.failed_reads,
+            blocks_given_up: self.trouble.given_up.len() as u64,
+            troubles: self.trouble.lines.clone(),
         }
-        let before = self.last.unwrap_or(*camera);
-        let motion = Motion {
-            time_s: self.frames as f64 / f64::from(self.tour.frames_per_s),
-            moved: before.eye.distance(camera.eye) as f32,
-            turned_rad: before.forward.angle_between(camera.forward),
-            eye: camera,
-            lights: &[],
-            future: self.tour.cameras.get(self.frames + 1..),
-        };
-        let asked = self.on_demand.as_ref().map(|_| RefCell::default());
-        let wants = Wants { opened, residency: &self.residency, asked };
-        let plan = self.planner.plan(&motion, &wants, self.residency.left_for_scheduler());
-        let sizes = wants.sizes(&plan.fetch, cell, camera);
-        let asked = wants.asked.map(RefCell::into_inner).unwrap_or_default();
-        plan.evict.into_iter().for_each(|b| self.residency.release(self.device, b));
-        let mut uploaded = 0;
-        for block in plan.fetch {
-            let bytes = sizes.get(&block).copied().unwrap_or(0);
-            // At least one block a frame, or one that is larger than the limit would never come. What is left waits, in its
-            // order: a later, smaller block may be useless without it.
-            let there = self.residency.has(block);
-            if !there && uploaded > 0 && self.upload_bytes_per_frame.is_some_and(|most| uploaded + bytes > most) {
-                break;
-            }
-            let texels = opened.stored(block).map_or(0, |s| s.texture_bytes);
-            if self.residency.hold(self.device, block, true, texels, scene, &fetch)? && !there {
-                uploaded += bytes;
-            }
+    }
+
+    /// Builds the cells that were asked for, and those again whose payloads could not be read.
+    fn build(&mut self, asked: &[CellId]) -> Result<(), Fault> {
+        let Some(builder) = &mut self.on_demand else { return Ok(()) };
+        let lost: BTreeSet<CellId> = self.trouble.given_up.iter().filter_map(|&b| trouble::cell_of(b)).collect();
+        for cell in lost.difference(&self.rebuilt).copied().collect::<Vec<_>>() {
+            self.rebuilt.insert(cell);
+            self.opened.unbuild(cell);
+            self.trouble.made_anew(|b| trouble::cell_of(*b) == Some(cell));
         }
-        if let Some(builder) = &mut self.on_demand {
-            builder.build(&mut self.opened, &asked)?;
-        }
-        (self.last, self.frames) = (Some(*camera), self.frames + 1);
-        Ok(uploaded)
+        builder.build(&mut self.opened, asked)?;
+        self.size_up();
+        Ok(())
     }
 
     /// The next frame of the path.
@@ -183,13 +214,23 @@ impl<'a> Walker<'a> {
             builder.enter(&mut self.opened, camera)?;
         }
         let cell = self.opened.cell_of(camera);
-        let uploaded_bytes = self.load(camera, cell)?;
+        let (failed_before, first) = (self.trouble.failed_reads, self.frames == 0);
+        let waited = self.arrive()?;
+        let (mut asked, cells) = self.plan(camera, cell);
+        let from_memory = self.upload_from_memory(&mut asked)?;
+        let now = first || self.limit.is_none();
+        let mut uploaded_bytes = waited + from_memory;
+        if now {
+            uploaded_bytes = waited + self.fetch(&asked, from_memory, true)?;
+        }
+        self.build(&cells)?;
+        (self.last, self.frames) = (Some(*camera), self.frames + 1);
         let residency = &self.residency;
         let drawn = self.opened.draws(cell, camera, &|b| residency.has(b));
         if let Some(s) = &mut self.surfaces {
             s.drawn.clone_from(&drawn.draws);
         }
-        // `load` has counted this frame already.
+        // This frame is counted already.
         let list = frame(camera, drawn.draws, &(self.tour.lit)(self.frames - 1));
         let warm_up = if self.frames == 1 { self.tour.measure.warm_up } else { 0 };
         for _ in 0..warm_up {
@@ -203,6 +244,9 @@ impl<'a> Walker<'a> {
                 best = again;
             }
         }
+        if !now {
+            self.fetch(&asked, from_memory, false)?;
+        }
         Ok(Walked {
             cell,
             frame_ms: time(&best),
@@ -213,6 +257,8 @@ impl<'a> Walker<'a> {
             points: best.points,
             lines: best.lines,
             missing: drawn.missing,
+            far_error_px: drawn.error_px,
+            failed_reads: self.trouble.failed_reads - failed_before,
             uploaded_bytes,
             resident_bytes: self.residency.bytes,
             texture_bytes: self.residency.texture_bytes,
@@ -268,8 +314,14 @@ impl<'a> Walker<'a> {
         }
         for id in cells {
             let payloads = opened.payloads(id);
-            for &b in &payloads {
-                self.device.load(b, tour.scene, &fetch)?;
+            let lost = payloads.iter().find_map(|&b| self.device.load(b, tour.scene, &fetch).err());
+            if let Some(fault) = lost {
+                if self.strict || !matches!(fault, Fault::Data { .. }) {
+                    return Err(fault);
+                }
+                self.trouble.line(format!("the claims of cell {} are not audited: {fault}", id.0));
+                payloads.into_iter().filter(|&b| !self.residency.has(b)).for_each(|b| self.device.free(b));
+                continue;
             }
             let draws = |c: &Camera| opened.far_draws(id, c);
             let drawn = |d: &[Draw], s: &Surfaces| s.pieces.borrow_mut().drawn(d, &fetch);

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
+use farfield_core::backend::Backend;
 use farfield_core::cell::{Active, Cell};
 use farfield_core::claim::Claim;
 use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind, Shading};
@@ -13,14 +14,16 @@ use farfield_core::strategy::{Candidate, Covers, Demand, DrawBudget, FarView, Le
 use farfield_core::{Aabb, Camera, Fault};
 use glam::DVec3;
 
+use super::loading::cost;
 use super::residency::Residency;
+use super::trouble::named;
 use crate::build::{Built, BuiltCell, Division};
 use crate::config::Pipeline;
 use crate::failure::Failure;
 use crate::store::{Manifest, Store, Stored, unpack};
 
 /// The asset of the scene; those of cells follow.
-const SHARED: AssetId = AssetId(0);
+pub(super) const SHARED: AssetId = AssetId(0);
 /// Where frames are drawn.
 pub(super) const SURFACE: TargetId = TargetId(0);
 /// Where they are lit.
@@ -29,6 +32,10 @@ pub(super) const PICTURE: TargetId = TargetId(1);
 /// The asset of a cell.
 pub(super) fn asset_of(cell: CellId) -> AssetId {
     AssetId(cell.0 + 1)
+}
+
+fn blocks_of(asset: AssetId, m: &Manifest) -> impl Iterator<Item = Block> {
+    m.payloads.keys().map(move |&id| Block::Payload(PayloadRef { asset, id }))
 }
 
 /// A pipeline ready to draw.
@@ -52,6 +59,8 @@ pub struct Drawn {
     pub draws: Vec<Draw>,
     /// Blocks that it missed.
     pub missing: u32,
+    /// The error that the far field believes in, pixels.
+    pub error_px: f32,
 }
 
 impl<'a> Opened<'a> {
@@ -113,22 +122,47 @@ impl<'a> Opened<'a> {
         manifest.payloads.get(&p.id)
     }
 
-    /// A payload from the store.
+    /// A payload from the store, read once.
     ///
     /// # Errors
-    /// [`Fault::Data`] where it is not there or not what was written.
+    /// [`Fault::Data`] with the file and what is wrong with it.
+    pub(super) fn read(&self, block: Block) -> Result<Payload, Fault> {
+        let gone = || Fault::Data { place: named(block), cause: "it is not in the store".into() };
+        let s = self.stored(block).ok_or_else(gone)?;
+        unpack(&self.store.read(&s.key, s.bytes, s.raw_bytes)?)
+    }
+
+    /// A payload from the store; what fails is read once more.
+    ///
+    /// # Errors
+    /// [`Fault::Data`] with the block, its file and what is wrong with it.
     pub fn fetch(&self, block: Block) -> Result<Payload, Fault> {
-        let gone = || Fault::Data { place: format!("{block:?}"), cause: "it is not in the store".into() };
-        unpack(&self.store.get(&self.stored(block).ok_or_else(gone)?.key).ok_or_else(gone)?)
+        let failed = |f: Fault| Fault::Data { place: named(block), cause: format!("{f} (read twice)") };
+        self.read(block).or_else(|_| self.read(block)).map_err(failed)
+    }
+
+    /// Forgets a cell's far field, so that it is built again when it is asked for.
+    pub(super) fn unbuild(&mut self, cell: CellId) {
+        if let Some(built) = self.built.cells.get_mut(&cell) {
+            built.manifest = None;
+            self.views.remove(&cell);
+        }
     }
 
     /// Every payload block of a cell, its scene's asset included.
     pub fn payloads(&self, cell: CellId) -> Vec<Block> {
-        let of = |asset: AssetId, m: &Manifest| -> Vec<Block> {
-            m.payloads.keys().map(|&id| Block::Payload(PayloadRef { asset, id })).collect()
-        };
-        let shared = self.built.shared.iter().flat_map(|s| of(SHARED, &s.1));
-        shared.chain(self.manifest(cell).into_iter().flat_map(|m| of(asset_of(cell), m))).collect()
+        let own = self.manifest(cell).into_iter().flat_map(|m| blocks_of(asset_of(cell), m));
+        self.shared_payloads().chain(own).collect()
+    }
+
+    /// Every payload block of all built cells.
+    pub(super) fn all_payloads(&self) -> impl Iterator<Item = Block> {
+        let cells = self.built.cells.iter().filter_map(|(id, c)| Some((*id, c.manifest.as_ref()?)));
+        self.shared_payloads().chain(cells.flat_map(|(id, m)| blocks_of(asset_of(id), m)))
+    }
+
+    fn shared_payloads(&self) -> impl Iterator<Item = Block> {
+        self.built.shared.iter().flat_map(|s| blocks_of(SHARED, &s.1))
     }
 
     /// What is stored of a cell, once it is built.
@@ -179,20 +213,21 @@ impl<'a> Opened<'a> {
         let there: ChunkSet =
             near.iter().filter(|c| resident(Block::Chunk(self.scene.chunks[c.index()].source))).collect();
         let mut missing = (near.len() - there.len()) as u32;
-        let mut draws = vec![];
+        let (mut draws, mut error_px) = (vec![], 0.0);
         if !there.is_empty() {
             draws.push(Draw { what: DrawWhat::Chunks(there), bounds: self.scene.bounds, error_px: 0.0 });
         }
         if let Some(id) = cell {
             let achieved = self.with_view(id, camera, self.pipeline.far_field.draw_budget(), |far, view| {
-                far.draw(resident, view, &mut draws).missing
+                far.draw(resident, view, &mut draws)
             });
+            error_px = achieved.map_or(0.0, |a| a.error_px);
             // A cell that is not built yet lacks what its windows show, or all of it.
             let windows = || self.active(id, camera).map_or(0, |(_, at)| at.sectors.len() as u32);
             let everything = u32::from(self.built.covers == Covers::Everything);
-            missing += achieved.unwrap_or_else(|| windows().max(everything));
+            missing += achieved.map(|a| a.missing).unwrap_or_else(|| windows().max(everything));
         }
-        Drawn { cell, draws, missing }
+        Drawn { cell, draws, missing, error_px }
     }
 
     /// What a cell's far field alone draws, all of it resident and cut short by no budget.
@@ -257,22 +292,53 @@ pub(super) struct Wants<'a> {
     pub(super) opened: &'a Opened<'a>,
     /// What is held.
     pub(super) residency: &'a Residency,
+    /// Who says what blocks take.
+    pub(super) backend: &'a dyn Backend,
+    /// The limit on all that is held.
+    pub(super) limit: Option<u64>,
+    /// Blocks that are not to be had.
+    pub(super) given_up: &'a BTreeSet<Block>,
     /// The cells that were asked for and are not built, first to last; `None` where nothing is built on demand.
     pub(super) asked: Option<RefCell<Vec<CellId>>>,
 }
 
 impl Wants<'_> {
-    /// What the far field says of the sizes of blocks, bytes, seen from a camera in a cell: of these blocks and of others in
-    /// the same cells.
-    pub(super) fn sizes(&self, blocks: &[Block], here: Option<CellId>, from: &Camera) -> BTreeMap<Block, u64> {
-        let own = |b: &Block| match b {
-            Block::Payload(p) if p.asset != SHARED => Some(CellId(p.asset.0 - 1)),
-            _ => here,
-        };
-        let cells: BTreeSet<CellId> = blocks.iter().filter_map(own).collect();
-        let mut all = vec![];
-        cells.into_iter().for_each(|c| self.of(c, from, &mut all));
-        all.into_iter().map(|c| (c.block, c.bytes)).collect()
+    /// What a block takes on the device; `None` where it is not to be had, ever.
+    fn bytes(&self, block: Block) -> Option<u64> {
+        if let Some(bytes) = self.residency.bytes_of(block) {
+            return Some(bytes);
+        }
+        let cost = cost(self.opened, self.opened.scene, self.backend, block)?;
+        let fits = self.limit.is_none_or(|l| cost.most_bytes() <= l);
+        (fits && !self.given_up.contains(&block)).then_some(cost.resident_bytes)
+    }
+
+    /// Puts the device's account of bytes in the place of the far field's, and leaves out what is not to be had and what is useless
+    /// without it.
+    fn weigh(&self, candidates: &mut Vec<Candidate>, first: usize) {
+        let mut gone: BTreeSet<Block> = BTreeSet::new();
+        for c in &mut candidates[first..] {
+            match self.bytes(c.block) {
+                Some(bytes) => c.bytes = bytes,
+                None => _ = gone.insert(c.block),
+            }
+            if c.after.is_some_and(|b| self.bytes(b).is_none()) {
+                gone.insert(c.block);
+            }
+        }
+        while !gone.is_empty() {
+            let before = gone.len();
+            let behind = candidates[first..].iter().filter(|c| c.after.is_some_and(|b| gone.contains(&b)));
+            gone.extend(behind.map(|c| c.block).collect::<Vec<_>>());
+            if gone.len() == before {
+                break;
+            }
+        }
+        let mut at = 0;
+        candidates.retain(|c| {
+            at += 1;
+            at <= first || !gone.contains(&c.block)
+        });
     }
 }
 
@@ -293,8 +359,9 @@ impl Demand for Wants<'_> {
     }
 
     fn of(&self, cell: CellId, from: &Camera, out: &mut Vec<Candidate>) {
-        let budget = self.opened.pipeline.far_field.draw_budget();
+        let (first, budget) = (out.len(), self.opened.pipeline.far_field.draw_budget());
         let built = self.opened.with_view(cell, from, budget, |far, view| far.wanted(view, out));
+        self.weigh(out, first);
         if let (None, Some(asked)) = (built, &self.asked) {
             asked.borrow_mut().push(cell);
         }
