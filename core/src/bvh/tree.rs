@@ -130,6 +130,8 @@ impl Tree {
         let fitted = binary.fit(&ends, &items, boxes);
         let mut tree = Self { nodes: vec![], order: items, bounds: Some(bounds) };
         tree.widen(&fitted);
+        // Nodes were pushed one by one: what is held is what is told.
+        tree.nodes.shrink_to_fit();
         tree
     }
 

@@ -23,14 +23,15 @@ use super::trouble::named;
 pub(super) type Asked = (Block, bool);
 
 /// What a block takes at each step; `None` where nothing is known of it.
-pub(super) fn cost(opened: &Opened<'_>, scene: &Scene, backend: &dyn Backend, block: Block) -> Option<Cost> {
+pub fn cost(opened: &Opened<'_>, scene: &Scene, backend: &dyn Backend, block: Block) -> Option<Cost> {
     let (extent, read_bytes, host_bytes) = match block {
         Block::Payload(_) => {
             let s = opened.stored(block)?;
             // The file and what it unpacks to; then that, the coded parts in it, the payload, and at most twice as much while its
-            // arrays grow and are decoded.
+            // arrays grow and are decoded; the places of samples while they are put in order.
             let host = s.extent.host_bytes();
-            (s.extent, (s.bytes + s.raw_bytes).max(2 * s.raw_bytes + 3 * host), host)
+            let decoding = 2 * s.raw_bytes + 3 * host + 48 * s.extent.samples;
+            (s.extent, (s.bytes + s.raw_bytes).max(decoding), host)
         }
         Block::Chunk(id) => {
             let extent = Extent::of_chunk(scene.meshes.get(id.mesh.index())?.chunks.get(id.chunk as usize)?);

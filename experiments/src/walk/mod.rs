@@ -24,6 +24,7 @@ use farfield_core::scene::Scene;
 use farfield_core::strategy::Planner;
 use farfield_core::{Camera, Fault};
 
+pub use loading::cost;
 pub use on_demand::OnDemand;
 pub use opened::{Drawn, Opened, frame};
 pub use reference::References;
