@@ -12,6 +12,7 @@ mod reference;
 mod residency;
 mod trouble;
 
+use std::cell::RefCell;
 use std::collections::BTreeSet;
 
 use farfield_core::backend::Backend;
