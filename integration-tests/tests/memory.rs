@@ -8,6 +8,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::sync::atomic::AtomicBool;
 
 use farfield_core::Fault;
 use farfield_core::backend::{Backend, BlockData, Counted, DeviceInfo};
@@ -16,10 +17,13 @@ use farfield_core::extent::{Extent, Takes};
 use farfield_core::id::{Block, TargetId};
 use farfield_core::image::{Picture, SurfaceImage};
 use farfield_core::payload::{MeshPart, Part, Payload};
+use farfield_experiments::build::capture;
 use farfield_experiments::config::{BackendName, BudgetSettings};
 use farfield_experiments::measure::{self, Metrics, Rendered};
+use farfield_experiments::progress::Progress;
 use farfield_experiments::results::MemoryUse;
-use farfield_experiments::walk::{Device, TRIES, Tour, Walked, Walker, device};
+use farfield_experiments::store::Store;
+use farfield_experiments::walk::{Device, OnDemand, Opened, TRIES, Tour, Walked, Walker, device};
 use farfield_integration_tests::lab::Lab;
 use farfield_integration_tests::stones;
 
@@ -316,12 +320,14 @@ fn payloads(lab: &Lab) -> (BTreeMap<Block, PathBuf>, BTreeMap<Block, Payload>) {
     let opened = lab.opened(0).unwrap();
     let blocks: std::collections::BTreeSet<Block> =
         opened.built.cells.keys().flat_map(|&c| opened.payloads(c)).collect();
-    let file = |b: Block| {
-        let name: String = opened.stored(b).unwrap().key.iter().map(|b| format!("{b:02x}")).collect();
-        lab.store().join("blocks").join(&name[..2]).join(&name[2..])
-    };
+    let file = |b: Block| file_of(lab, &opened, b);
     let sound = blocks.iter().map(|&b| (b, opened.fetch(b).unwrap())).collect();
     (blocks.into_iter().map(|b| (b, file(b))).collect(), sound)
+}
+
+fn file_of(lab: &Lab, opened: &Opened<'_>, block: Block) -> PathBuf {
+    let name: String = opened.stored(block).unwrap().key.iter().map(|b| format!("{b:02x}")).collect();
+    lab.store().join("blocks").join(&name[..2]).join(&name[2..])
 }
 
 fn damage(file: &Path, how: usize) {
@@ -464,6 +470,57 @@ fn a_damaged_file_of_chunks_is_told_and_the_walk_goes_on() {
         "{m:?}"
     );
     assert!(left.missing() > 0);
+}
+
+#[test]
+fn a_cell_that_was_built_on_demand_is_built_again_when_its_payloads_are_damaged() {
+    let folder = stones::folder();
+    let pipeline = "[measure]\nrepeats = 1\nwarm_up = 0\n[[pipeline]]\nname = \"tested\"\nbackend = \"cpu\"\n\
+                    build = \"on-demand\"\npartition = { type = \"hex-cells\", edge = 3.0 }\n\
+                    far_field = { type = \"textured-lod-mesh\", edge_px = 1.0 }\n[[pipeline]]\nname = \"all geometry\"\nbackend = \"cpu\"\n\
+                    far_field = { type = \"geometry\" }\n[reference]\npipeline = \"all geometry\"\n";
+    let lab = Lab::new(&stones::experiment([96, 72], pipeline), folder.path()).unwrap();
+    let (e, p) = (&lab.experiment, &lab.prepared);
+    let store = Store::open(lab.store(), Box::new(|_| ())).unwrap();
+    let (capture, progress, never) =
+        (capture(BackendName::Cpu, &p.scene).unwrap(), Progress::new(true), AtomicBool::new(false));
+    let site = p.site(&store, &*capture, &never, &progress);
+    // The eye stands still.
+    let cameras = vec![p.cameras[0]; 8];
+    let tour = Tour {
+        scene: &p.scene,
+        views: &p.views,
+        lit: &|_| p.lit(0),
+        cameras: &cameras,
+        frames_per_s: e.view.frames_per_s,
+        measure: &e.measure,
+    };
+    let mut device = Device::new(device::open(BackendName::Cpu, &p.scene).unwrap());
+    // The files of the cell's payloads, the last frame and picture, and what was told.
+    let mut walked = |before: &mut dyn FnMut(usize)| {
+        let on_demand = OnDemand::new(&site, f64::INFINITY);
+        let budget = BudgetSettings { memory_bytes: Some(64 << 20), ..Default::default() };
+        let mut walker = Walker::new(&tour, lab.opened(0).unwrap(), Some(on_demand), &mut device, &budget);
+        let mut last = None;
+        for (i, camera) in cameras.iter().enumerate() {
+            before(i);
+            last = Some(walker.step(camera).unwrap_or_else(|f| panic!("frame {i}: {f}")));
+        }
+        let picture = walker.read().unwrap().picture;
+        let opened = &walker.opened;
+        let blocks: Vec<Block> = opened.built.cells.keys().flat_map(|&c| opened.payloads(c)).collect();
+        let files: Vec<PathBuf> = blocks.iter().map(|&b| file_of(&lab, opened, b)).collect();
+        (files, last.unwrap(), picture, walker.memory())
+    };
+    let (files, good, picture, memory) = walked(&mut |_| ());
+    assert!(files.len() > 3 && (good.missing, memory.failed_reads) == (0, 0), "{memory:?}");
+    let (_, last, again, memory) = walked(&mut |frame| {
+        if frame == 1 {
+            files.iter().enumerate().for_each(|(i, f)| damage(f, i % 3));
+        }
+    });
+    assert!(memory.failed_reads >= u64::from(TRIES) && memory.blocks_given_up == 0, "{memory:?}");
+    assert!(last.missing == 0 && again == picture, "{memory:?}");
 }
 
 fn walkdir(root: &Path) -> Vec<PathBuf> {

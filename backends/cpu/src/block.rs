@@ -12,7 +12,7 @@ use farfield_core::payload::{AtlasPart, LinesPart, MeshPart, Part, PointsPart, P
 use glam::{DVec3, Vec2, Vec3};
 
 /// What building a hierarchy takes for a while, bytes a triangle: boxes, a binary tree twice, and the tree between it and the wide one.
-const BUILD_BYTES: u64 = 640;
+const BUILD_BYTES: u64 = 320;
 
 /// Triangles with attributes.
 pub(crate) struct Surface {

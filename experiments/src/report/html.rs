@@ -298,6 +298,24 @@ fn details(h: &mut String, s: &Summary) {
             ),
         );
     }
+    for p in &s.pipelines {
+        let m = &p.memory;
+        if let Some(limit) = m.limit_bytes {
+            push(
+                h,
+                format_args!(
+                    "<li><b>{}</b>: at most {:.1} of {:.1} MB held; {} blocks never fit, {} reads failed, {} blocks given up</li>",
+                    text(&p.name),
+                    m.peak_bytes as f64 / 1e6,
+                    limit as f64 / 1e6,
+                    m.blocks_too_large,
+                    m.failed_reads,
+                    m.blocks_given_up
+                ),
+            );
+        }
+        m.troubles.iter().for_each(|t| push(h, format_args!("<li><b>{}</b>: {}</li>", text(&p.name), text(t))));
+    }
     *h += "</ul>";
     levels(h, &s.pipelines);
     *h += "<h2>Settings</h2>";

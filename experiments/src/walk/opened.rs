@@ -308,7 +308,8 @@ impl Wants<'_> {
         if let Some(bytes) = self.residency.bytes_of(block) {
             return Some(bytes);
         }
-        let cost = cost(self.opened, self.opened.scene, self.backend, block)?;
+        // What is not stored is asked for in vain, which is told.
+        let cost = cost(self.opened, self.opened.scene, self.backend, block).unwrap_or_default();
         let fits = self.limit.is_none_or(|l| cost.most_bytes() <= l);
         (fits && !self.given_up.contains(&block)).then_some(cost.resident_bytes)
     }
