@@ -21,6 +21,9 @@ pub struct Summary {
     pub reference: String,
     /// How frames equal to the reference enter a mean of PSNRs.
     pub equal_frames_note: String,
+    /// The process's peak resident set until the walks' end, bytes; 0 where the system does not tell.
+    #[serde(default)]
+    pub peak_rss_bytes: u64,
     /// One a pipeline, in the order of the experiment file.
     pub pipelines: Vec<PipelineSummary>,
 }
@@ -80,6 +83,9 @@ pub struct PipelineSummary {
     pub texture_bytes: u64,
     /// Payload and geometry blocks resident, bytes, at most.
     pub resident_bytes: u64,
+    /// The largest error that the far field states of what a frame draws, pixels.
+    #[serde(default)]
+    pub stated_error_px: MeanMax,
     /// Frames whose eye was in no cell: plain geometry was drawn.
     pub frames_outside_cells: usize,
     /// Original triangles over triangles drawn in a cell, near and far together, not culled to the frustum; mean over the
@@ -256,6 +262,9 @@ pub struct FrameRow {
     pub lines: u64,
     /// Far blocks that were not resident.
     pub missing_blocks: u32,
+    /// The largest error that the far field states of what was drawn, pixels.
+    #[serde(default)]
+    pub stated_error_px: f32,
     /// Bytes of blocks that the scheduler had uploaded for it.
     pub uploaded_bytes: u64,
     /// Texels resident, bytes.

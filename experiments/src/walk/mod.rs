@@ -91,6 +91,8 @@ pub struct Walked {
     pub lines: u64,
     /// Blocks not there.
     pub missing: u32,
+    /// The largest error that the far field states of its draws, pixels.
+    pub stated_error_px: f32,
     /// Bytes that the scheduler had uploaded for it, by the far field's own account of its blocks.
     pub uploaded_bytes: u64,
     /// Bytes resident.
@@ -189,6 +191,7 @@ impl<'a> Walker<'a> {
         if let Some(s) = &mut self.surfaces {
             s.drawn.clone_from(&drawn.draws);
         }
+        let stated_error_px = drawn.draws.iter().map(|d| d.error_px).fold(0.0, f32::max);
         // `load` has counted this frame already.
         let list = frame(camera, drawn.draws, &(self.tour.lit)(self.frames - 1));
         let warm_up = if self.frames == 1 { self.tour.measure.warm_up } else { 0 };
@@ -213,6 +216,7 @@ impl<'a> Walker<'a> {
             points: best.points,
             lines: best.lines,
             missing: drawn.missing,
+            stated_error_px,
             uploaded_bytes,
             resident_bytes: self.residency.bytes,
             texture_bytes: self.residency.texture_bytes,
