@@ -21,6 +21,9 @@ pub struct Summary {
     pub reference: String,
     /// How frames equal to the reference enter a mean of PSNRs.
     pub equal_frames_note: String,
+    /// The process's peak resident set until the walks' end, bytes; 0 where the system does not tell.
+    #[serde(default)]
+    pub peak_rss_bytes: u64,
     /// One a pipeline, in the order of the experiment file.
     pub pipelines: Vec<PipelineSummary>,
 }
@@ -83,6 +86,9 @@ pub struct PipelineSummary {
     /// What was held at most, under which limit, and what could not be had.
     #[serde(default)]
     pub memory: MemoryUse,
+    /// The largest error that the far field states of what a frame draws, pixels.
+    #[serde(default)]
+    pub far_error_px: MeanMax,
     /// Frames whose eye was in no cell: plain geometry was drawn.
     pub frames_outside_cells: usize,
     /// Original triangles over triangles drawn in a cell, near and far together, not culled to the frustum; mean over the

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use farfield_core::Camera;
 use farfield_core::camera::ViewModel;
 use farfield_core::claim::Quantity;
 use farfield_core::context::Capture;
 use farfield_core::draw::Shading;
+use farfield_core::mesh::MeshChunk;
 use farfield_core::scene::Scene;
+use farfield_core::strategy::LeftOut;
+use farfield_core::{Camera, Fault};
 
 use crate::audit::{self, Measured};
 use crate::build::{self, Built, Division, NoCapture, Site};
@@ -69,6 +71,8 @@ pub struct Prepared {
     pub turn_rad_per_frame: f64,
     /// Each pipeline's cells.
     pub divisions: Vec<Division>,
+    /// Where the scene's triangles stay on disk, the most bytes of them that may be held at once.
+    pub limit_bytes: Option<u64>,
 }
 
 /// Loads the scene, lays the path and divides the viewpoints; far fields are asked whether they serve the scene.
@@ -95,7 +99,8 @@ pub fn prepare(experiment: &Experiment, options: &Options<'_>) -> Result<Prepare
     let shading = scene::shading(&experiment.light);
     let turn_rad_per_frame =
         f64::from(experiment.light.turn_deg_per_s).to_radians() / f64::from(experiment.view.frames_per_s);
-    Ok(Prepared { scene, source: loaded.source, views, cameras, shading, turn_rad_per_frame, divisions })
+    let limit_bytes = loaded.limit_bytes;
+    Ok(Prepared { scene, source: loaded.source, views, cameras, shading, turn_rad_per_frame, divisions, limit_bytes })
 }
 
 pub(crate) fn open_store(options: &Options<'_>) -> Result<Store, Failure> {
@@ -110,23 +115,41 @@ pub(crate) fn captures(
     prepared: &Prepared,
     which: &[usize],
 ) -> Result<Box<dyn Capture>, Failure> {
-    let mut needed = false;
     for &i in which {
         let p = &experiment.pipelines[i];
         let needs = p.far_field.needs(&prepared.scene, None);
-        needed |= needs.map_err(|f| Failure::before(format!("pipeline \"{}\"", p.name), f))?.captures;
+        if needs.map_err(|f| Failure::before(format!("pipeline \"{}\"", p.name), f))?.captures {
+            let who = format!("pipeline \"{}\" takes pictures of the scene while it is built", p.name);
+            return capture_of(experiment, &prepared.scene, prepared.limit_bytes, &who);
+        }
     }
-    if !needed {
-        return Ok(Box::new(NoCapture));
-    }
-    capture_of(experiment, &prepared.scene)
+    Ok(Box::new(NoCapture))
 }
 
-/// The captures that `[build]` names.
-pub(crate) fn capture_of(experiment: &Experiment, scene: &Arc<Scene>) -> Result<Box<dyn Capture>, Failure> {
+/// The captures that `[build]` names, for `who`: they hold all triangles at once.
+pub(crate) fn capture_of(
+    experiment: &Experiment,
+    scene: &Arc<Scene>,
+    limit_bytes: Option<u64>,
+    who: &str,
+) -> Result<Box<dyn Capture>, Failure> {
+    if let Some(why) = too_large(scene, limit_bytes) {
+        return Err(Failure::input(who, why));
+    }
     device::available(experiment.build.capture)?;
     let failed = |f| Failure::during(format!("captures by {}", experiment.build.capture.name()), f);
     build::capture(experiment.build.capture, scene).map_err(failed)
+}
+
+/// Why a scene's triangles cannot all be held at once, where they cannot.
+fn too_large(scene: &Scene, limit_bytes: Option<u64>) -> Option<String> {
+    let bytes: u64 = scene.meshes.iter().flat_map(|m| &m.chunks).map(MeshChunk::bytes).sum();
+    let limit = limit_bytes.filter(|&most| bytes > most)?;
+    let [all, most] = [bytes, limit].map(|b| b.div_ceil(1_000_000));
+    Some(format!(
+        "that takes all triangles at once, {all} MB, where [scene] memory_bytes allows {most} MB: \
+         raise memory_bytes, or set out_of_core = false"
+    ))
 }
 
 /// Builds what `which` pipelines need and the store lacks.
@@ -197,6 +220,10 @@ pub fn build(experiment: &Experiment, options: &Options<'_>) -> Result<String, F
 pub fn run(experiment: &Experiment, out: &Path, options: &Options<'_>) -> Result<String, Failure> {
     let backends = device::choose(&experiment.pipelines, &mut |line| (options.say)(&line))?;
     let prepared = prepare(experiment, options)?;
+    if let Some(why) = too_large(&prepared.scene, prepared.limit_bytes).filter(|_| experiment.measure.surface_distance)
+    {
+        return Err(Failure::input("[measure] surface_distance compares with the scene's surface", why));
+    }
     let store = open_store(options)?;
     let all: Vec<usize> = (0..experiment.pipelines.len()).collect();
     let capture = captures(experiment, &prepared, &all)?;
@@ -224,6 +251,10 @@ pub fn run(experiment: &Experiment, out: &Path, options: &Options<'_>) -> Result
         let one = One { experiment, prepared: &prepared, site: &site, options, index: i, surface: surface.as_ref() };
         let built = built[i].take().ok_or(Failure::Cancelled)?;
         done.insert(i, one.walk(built, device, &references, &mut gallery)?);
+        if prepared.limit_bytes.is_some() {
+            // Its chunks would stay for the next pipeline, and count against nobody's budget.
+            devices.clear();
+        }
     }
     let rows: Vec<FrameRow> = done.values().flat_map(|d| d.1.clone()).collect();
     let summary = summary(experiment, &prepared, done.into_values().map(|d| d.0).collect());
@@ -250,6 +281,7 @@ fn summary(experiment: &Experiment, prepared: &Prepared, pipelines: Vec<Pipeline
         },
         reference: experiment.pipelines[experiment.reference].name.clone(),
         equal_frames_note: EQUAL_FRAMES_NOTE.into(),
+        peak_rss_bytes: build::peak_rss_bytes(),
         pipelines,
     }
 }
@@ -274,6 +306,22 @@ impl One<'_> {
         self.index == self.experiment.reference
     }
 
+    /// Whether it is the reference of others: a pipeline alone is walked within its budget, and nothing of it is kept.
+    fn is_compared_with(&self) -> bool {
+        self.is_reference() && self.experiment.pipelines.len() > 1
+    }
+
+    fn reference_too_large(&self, frame: usize, missing: u32) -> Failure {
+        let most = self.prepared.limit_bytes.unwrap_or(0).div_ceil(1_000_000);
+        Failure::work(
+            format!("the reference \"{}\" lacks {missing} blocks in frame {frame}", self.pipeline().name),
+            format!(
+                "what a frame of it draws does not fit in the {most} MB that [scene] memory_bytes allows: raise memory_bytes, take a \
+                 [reference] pipeline that draws less, or leave one pipeline only, which is compared with nothing"
+            ),
+        )
+    }
+
     fn walk(
         &self,
         built: Built,
@@ -296,8 +344,12 @@ impl One<'_> {
             frames_per_s: e.view.frames_per_s,
             measure: &e.measure,
         };
-        // What others are compared with may not lack anything.
-        let budget = if self.is_reference() { BudgetSettings::default() } else { e.budget.clone() };
+        let budget = if self.is_compared_with() {
+            // It may not lack anything, and of a scene on disk it may hold what that may.
+            BudgetSettings { memory_bytes: p.limit_bytes, upload_bytes_per_frame: None }
+        } else {
+            e.budget.clone()
+        };
         let info = device.backend.info().clone();
         let mut walker = Walker::new(&tour, opened, on_demand, device, &budget);
         if let Some(scene) = self.surface {
@@ -318,8 +370,11 @@ impl One<'_> {
                 return Err(Failure::Cancelled);
             }
             let w = walker.step(camera).map_err(failed(i))?;
+            if self.is_compared_with() && p.limit_bytes.is_some() && w.missing > 0 {
+                return Err(self.reference_too_large(i, w.missing));
+            }
             let mut row = row(name, i, &w);
-            if self.is_reference() && reads.iter().any(|r| r.read(i)) {
+            if self.is_compared_with() && reads.iter().any(|r| r.read(i)) {
                 references.keep(i, &walker.read().map_err(failed(i))?).map_err(io)?;
             }
             let mine = &reads[self.index];
@@ -348,14 +403,24 @@ impl One<'_> {
             bar.inc();
         }
         bar.done();
-        let measured = walker.audit(e.measure.audit_views, AUDIT_SEED).map_err(failed(p.cameras.len()))?;
+        // Audits look at the scene from all sides.
+        let whole = too_large(&p.scene, p.limit_bytes);
+        let audit_views = if whole.is_some() { 0 } else { e.measure.audit_views };
+        let claims = walker.opened.has_claims() && e.measure.audit_views > 0;
+        let not_audited = whole.filter(|_| claims).map(|reason| LeftOut {
+            stage: "audits of claims".into(),
+            reason,
+            decided: "run".into(),
+        });
+        let measured = walker.audit(audit_views, AUDIT_SEED).map_err(failed(p.cameras.len()))?;
         let memory = walker.memory();
         memory.troubles.iter().for_each(|line| (self.options.say)(&format!("pipeline \"{name}\": {line}")));
         let of = |pick: fn(&Walked) -> u64| MeanMax::of(walked.iter().map(|w| pick(w) as f64));
         let times: Vec<f64> = walked.iter().map(|w| w.frame_ms).collect();
         let ratios: Vec<f64> =
             walked.iter().filter_map(|w| w.cell).map(|c| walker.opened.original_over_simplified(c)).collect();
-        let Built { preprocess, left_out, shared, .. } = walker.opened.built;
+        let Built { preprocess, mut left_out, shared, .. } = walker.opened.built;
+        left_out.extend(not_audited);
         let index = shared.as_ref().map(|s| s.1.index.as_slice());
         let levels = self.pipeline().far_field.census(&p.scene, index).map_err(failed(p.cameras.len()))?;
         let floor = floor(&mut *device.backend, &p.views, &p.shading, FLOOR_FRAMES).map_err(failed(p.cameras.len()))?;
@@ -378,6 +443,7 @@ impl One<'_> {
             texture_bytes: walked.iter().map(|w| w.texture_bytes).max().unwrap_or(0),
             resident_bytes: walked.iter().map(|w| w.resident_bytes).max().unwrap_or(0),
             memory,
+            far_error_px: MeanMax::of(walked.iter().map(|w| w.far_error_px.into())),
             frames_outside_cells: walked.iter().filter(|w| w.cell.is_none()).count(),
             original_over_simplified: MeanMax::of(ratios).mean,
             error: (!self.is_reference()).then(|| measure::summary(&errors, &changes)),
@@ -477,7 +543,7 @@ pub fn render(
     Ok((camera, rendered))
 }
 
-/// A pipeline's picture from any viewpoint, everything it may draw there resident; nothing is timed.
+/// A pipeline's picture from any viewpoint, everything that it may draw there resident, and no more; nothing is timed.
 ///
 /// # Errors
 /// What loading and drawing give.
@@ -487,16 +553,13 @@ pub fn render_at(
     prepared: &Prepared,
     camera: &Camera,
     shading: &Shading,
-) -> Result<Rendered, farfield_core::Fault> {
+) -> Result<Rendered, Fault> {
+    let scene = &*prepared.scene;
     let fetch = |b| opened.fetch(b);
-    for id in prepared.scene.mesh_chunk_ids() {
-        device.load(farfield_core::id::Block::Chunk(id), &prepared.scene, &fetch)?;
+    let drawn = opened.draws(opened.cell_of(camera), camera, &|_| true);
+    for block in opened.blocks_of(&drawn.draws)? {
+        device.load(block, scene, &fetch)?;
     }
-    let cell = opened.cell_of(camera);
-    for block in cell.map(|c| opened.payloads(c)).unwrap_or_default() {
-        device.load(block, &prepared.scene, &fetch)?;
-    }
-    let drawn = opened.draws(cell, camera, &|_| true);
     device.backend.render(&frame(camera, drawn.draws, shading))?;
     crate::walk::read(&mut *device.backend)
 }

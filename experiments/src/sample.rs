@@ -49,14 +49,14 @@ pub fn at(
     }
     let loaded = scene::scene(experiment, options)?;
     loaded.warnings.iter().for_each(|w| (options.say)(&format!("warning: {w}")));
-    let scene = Arc::new(loaded.scene);
+    let (scene, limit_bytes) = (Arc::new(loaded.scene), loaded.limit_bytes);
     let near = path::views(&experiment.view, &scene).near;
     let eye = DVec3::from(world) - scene.origin;
     if !eye.as_vec3().is_finite() {
         let what = format!("no sample can be taken at {world:?}");
         return Err(Failure::input(what, "it is farther from the scene than 32-bit numbers reach"));
     }
-    let capture = run::capture_of(experiment, &scene)?;
+    let capture = run::capture_of(experiment, &scene, limit_bytes, "a sample is a picture of the scene")?;
     let shots = Shots { capture: &*capture, face_px, near, origin: scene.origin };
     shots.write(eye, &scene.all_chunks(), out)
 }

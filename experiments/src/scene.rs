@@ -31,6 +31,8 @@ pub struct Loaded {
     pub warnings: Vec<String>,
     /// The way that it brings along, where it does.
     pub route: Option<Route>,
+    /// Where its triangles stay on disk, the most bytes of them that may be held at once.
+    pub limit_bytes: Option<u64>,
 }
 
 /// Loads or generates an experiment's scene.
@@ -80,7 +82,8 @@ fn file(experiment: &Experiment, path: &str, options: &Options<'_>) -> Result<Lo
     if scene.triangles() == 0 {
         return Err(refused(&format!("{path}: there is no triangle in it")));
     }
-    Ok(Loaded { scene, source: path.to_owned(), warnings, route: None })
+    let limit_bytes = stream.then_some(s.memory_bytes);
+    Ok(Loaded { scene, source: path.to_owned(), warnings, route: None, limit_bytes })
 }
 
 /// A scene whose triangles stay on disk.
@@ -128,7 +131,7 @@ fn generated(s: &SceneSettings, to_world: DAffine3) -> Result<Loaded, Failure> {
     };
     let route = (!corners.is_empty())
         .then(|| Route { points: corners.iter().map(local).collect(), rounding: ROUNDING * s.scale });
-    Ok(Loaded { scene, source, warnings: vec![], route })
+    Ok(Loaded { scene, source, warnings: vec![], route, limit_bytes: None })
 }
 
 /// The park of the paper's models, read from a folder.

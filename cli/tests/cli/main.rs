@@ -2,6 +2,7 @@
 
 mod commands;
 mod common;
+mod larger_than_memory;
 mod out_of_core;
 mod resume;
 mod sample;

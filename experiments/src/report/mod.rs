@@ -128,6 +128,7 @@ mod tests {
             texture_bytes: 0,
             resident_bytes: 0,
             memory: MemoryUse::default(),
+            far_error_px: MeanMax::default(),
             frames_outside_cells: 0,
             original_over_simplified: 0.0,
             error: psnr.map(|d| ErrorSummary {
@@ -152,6 +153,7 @@ mod tests {
             },
             reference: "all".into(),
             equal_frames_note: crate::measure::EQUAL_FRAMES_NOTE.into(),
+            peak_rss_bytes: 0,
             pipelines: vec![pipeline("all", 20.0, None), pipeline("hybrid", 2.5, Some(39.25))],
         }
     }

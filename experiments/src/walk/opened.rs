@@ -8,7 +8,7 @@ use farfield_core::cell::{Active, Cell};
 use farfield_core::claim::Claim;
 use farfield_core::draw::{Draw, DrawList, DrawWhat, Pass, PassKind, Shading};
 use farfield_core::id::{AssetId, Block, CellId, PayloadRef, SplitId, TargetId};
-use farfield_core::payload::Payload;
+use farfield_core::payload::{Part, Payload, Projector};
 use farfield_core::scene::{ChunkSet, Scene};
 use farfield_core::strategy::{Candidate, Covers, Demand, DrawBudget, FarView, LeftOut, View};
 use farfield_core::{Aabb, Camera, Fault};
@@ -149,6 +149,33 @@ impl<'a> Opened<'a> {
         }
     }
 
+    /// The blocks that draws need: chunks, payloads, and the atlases that their projectors take from.
+    ///
+    /// # Errors
+    /// As [`Opened::fetch`].
+    pub fn blocks_of(&self, draws: &[Draw]) -> Result<BTreeSet<Block>, Fault> {
+        let mut out = BTreeSet::new();
+        for d in draws {
+            match &d.what {
+                DrawWhat::Chunks(set) => {
+                    out.extend(set.iter().map(|c| Block::Chunk(self.scene.chunks[c.index()].source)));
+                }
+                DrawWhat::Payload { id, .. } => {
+                    let block = Block::Payload(*id);
+                    if out.insert(block) {
+                        let atlas = |p: &Projector| Block::Payload(PayloadRef { asset: id.asset, id: p.atlas });
+                        for part in &self.fetch(block)?.parts {
+                            if let Part::Projected(p) = part {
+                                out.extend(p.projectors.iter().map(atlas));
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        Ok(out)
+    }
+
     /// Every payload block of a cell, its scene's asset included.
     pub fn payloads(&self, cell: CellId) -> Vec<Block> {
         let own = self.manifest(cell).into_iter().flat_map(|m| blocks_of(asset_of(cell), m));
@@ -173,6 +200,11 @@ impl<'a> Opened<'a> {
     /// What the far field claims of a cell.
     pub fn claims(&self, cell: CellId) -> &[Claim] {
         self.manifest(cell).map_or(&[], |m| &m.claims)
+    }
+
+    /// Whether anything is claimed of any built cell.
+    pub fn has_claims(&self) -> bool {
+        self.built.cells.iter().any(|(id, c)| !c.cell.claims.is_empty() || !self.claims(*id).is_empty())
     }
 
     /// A cell, and what a camera uses of it.

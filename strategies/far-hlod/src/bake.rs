@@ -1,6 +1,6 @@
 //! Bottom-up construction (section 3): a node is simplified from the nodes two levels below it, up to the edge of its cube over the resolution.
 //!
-//! Depth first, so that only the meshes beside the path to the root are in memory; subtrees of [`PARALLEL_DEPTH`] in parallel.
+//! Depth first, so that only the meshes beside the paths to the root are in memory, a path for each thread at work.
 
 use farfield_core::context::{Context, collect};
 use farfield_core::id::LocalPayload;
@@ -19,7 +19,7 @@ use crate::texture;
 use crate::tree::{Borders, Tree};
 use crate::{PointPolygonHlod, Primitives, points};
 
-/// Subtrees whose roots stand this deep are independent jobs: up to 64.
+/// Subtrees whose roots stand this deep or higher are independent jobs: up to 64 side by side.
 const PARALLEL_DEPTH: u32 = 2;
 
 /// A built subtree: what the levels above still need of it.
@@ -59,37 +59,21 @@ pub(crate) fn bake(
     let origin = grid.origin(job.scene.bounds.centre());
     let borders = Borders::find(job.scene, &tree, cx)?;
     let baker = Baker { own, job, out, cx, tree, borders, grid, origin };
-    let nodes = &baker.tree.octree.nodes;
-    let jobs: Vec<u32> = (0..nodes.len() as u32)
-        .filter(|&n| {
-            let depth = nodes[n as usize].depth;
-            depth == PARALLEL_DEPTH || (depth < PARALLEL_DEPTH && baker.tree.is_leaf(n))
-        })
-        .collect();
-    let mut built = jobs.iter().copied().zip(collect(cx.run, jobs.len(), &|i| baker.subtree(jobs[i]))?);
-    let whole = baker.top(0, &mut built)?;
-    Ok(Skeleton { nodes: whole.nodes })
+    Ok(Skeleton { nodes: baker.subtree(0)?.nodes })
 }
 
 impl Baker<'_> {
-    /// The nodes above the subtrees, which come in order.
-    fn top(&self, node: u32, built: &mut dyn Iterator<Item = (u32, Built)>) -> Result<Built, Fault> {
-        let depth = self.tree.octree.nodes[node as usize].depth;
-        if depth == PARALLEL_DEPTH || self.tree.is_leaf(node) {
-            let next = built.next().filter(|b| b.0 == node);
-            return next.map(|b| b.1).ok_or_else(|| Fault::Refused("point-polygon-hlod: a subtree is missing".into()));
-        }
-        let children: Vec<u32> = self.tree.octree.children(node).collect();
-        let below = children.iter().map(|&c| self.top(c, built)).collect::<Result<Vec<_>, _>>()?;
-        self.inner(node, below)
-    }
-
     fn subtree(&self, node: u32) -> Result<Built, Fault> {
         self.cx.check()?;
         if self.tree.is_leaf(node) {
             return self.leaf(node);
         }
-        let below = self.tree.octree.children(node).map(|c| self.subtree(c)).collect::<Result<Vec<_>, _>>()?;
+        let children: Vec<u32> = self.tree.octree.children(node).collect();
+        let below = if self.tree.octree.nodes[node as usize].depth < PARALLEL_DEPTH {
+            collect(self.cx.run, children.len(), &|i| self.subtree(children[i]))?
+        } else {
+            children.iter().map(|&c| self.subtree(c)).collect::<Result<Vec<_>, _>>()?
+        };
         self.inner(node, below)
     }
 
@@ -105,13 +89,15 @@ impl Baker<'_> {
         Ok(Built { piece, children: vec![], nodes: vec![node] })
     }
 
-    fn inner(&self, node: u32, below: Vec<Built>) -> Result<Built, Fault> {
+    fn inner(&self, node: u32, mut below: Vec<Built>) -> Result<Built, Fault> {
         let sources: Vec<&Piece> = below
             .iter()
             .flat_map(|b| if b.children.is_empty() { std::slice::from_ref(&b.piece) } else { &b.children })
             .collect();
         let allowance = self.tree.allowance(node, self.own.resolution);
         let mut piece = Piece::joined(&sources);
+        // Only its children are needed above: at the root there is more in what it is made of than in all else.
+        below.iter_mut().for_each(|b| b.children = vec![]);
         piece.smooth(&self.tree.below(node), allowance);
         let piece =
             piece.simplified(&self.tree.below(node), allowance - self.grid_of(node).error(), &*self.own.metric)?;

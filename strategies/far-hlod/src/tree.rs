@@ -2,8 +2,9 @@
 //!
 //! Nodes are numbered in preorder, so that the nodes below one, and its leaves with them, are a run of numbers.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use farfield_core::Fault;
 use farfield_core::context::{Context, collect};
@@ -54,50 +55,77 @@ impl Tree {
     }
 }
 
-/// The first and the last leaf that use a vertex, for those that several use.
+/// The first and the last leaf that use a vertex, for those that several use; sorted by vertex.
 #[derive(Default)]
-pub(crate) struct Borders(HashMap<(ObjectId, u32), [u32; 2]>);
+pub(crate) struct Borders(Vec<((ObjectId, u32), [u32; 2])>);
 
 impl Borders {
-    /// One look at every chunk, objects in parallel. Memory: 4 bytes a vertex of the objects at work, and the border's vertices.
+    /// Two looks at every chunk, leaves in parallel: which vertices several leaves use, then by which. Memory: a quarter of a byte a vertex of the
+    /// objects at work, and the border's vertices.
     pub(crate) fn find(scene: &Scene, tree: &Tree, cx: &Context<'_>) -> Result<Self, Fault> {
         let mut leaf = vec![0u32; scene.chunks.len()];
         for (n, node) in (0u32..).zip(&tree.octree.nodes) {
             node.chunks.iter().for_each(|c| leaf[c.index()] = n);
         }
         let of_object = |o: usize| {
-            let (object, mut shared) = (&scene.objects[o], vec![]);
-            let chunks = object.chunks.start as usize..object.chunks.end as usize;
-            if leaf[chunks.clone()].windows(2).all(|w| w[0] == w[1]) {
-                return Ok(shared);
+            let object = &scene.objects[o];
+            let mut leaves: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+            (object.chunks.start as usize..object.chunks.end as usize)
+                .for_each(|c| leaves.entry(leaf[c]).or_default().push(c));
+            if leaves.len() <= 1 {
+                return Ok(vec![]);
             }
-            let mut owner = vec![u32::MAX; scene.meshes[object.mesh.index()].vertex_ids as usize];
-            for c in chunks {
-                cx.check()?;
-                let here = leaf[c];
-                scene.geometry.with(scene.chunks[c].source, &mut |chunk| {
-                    for &v in &chunk.vertex_ids {
-                        let first = &mut owner[v as usize];
-                        if *first == u32::MAX {
-                            *first = here;
-                        } else if *first != here {
-                            shared.push(((ObjectId(o as u32), v), [here, *first]));
-                        }
-                    }
-                })?;
-            }
-            Ok(shared)
+            let leaves: Vec<(u32, Vec<usize>)> = leaves.into_iter().collect();
+            // A leaf's vertices, each once.
+            let vertices = |i: usize| -> Result<Vec<u32>, Fault> {
+                let mut all = vec![];
+                for &c in &leaves[i].1 {
+                    cx.check()?;
+                    scene.geometry.with(scene.chunks[c].source, &mut |chunk| all.extend(&chunk.vertex_ids))?;
+                }
+                all.sort_unstable();
+                all.dedup();
+                Ok(all)
+            };
+            let count = scene.meshes[object.mesh.index()].vertex_ids;
+            let (used, shared) = (Bits::new(count), Bits::new(count));
+            cx.run.each(leaves.len(), &|i| {
+                vertices(i)?.into_iter().filter(|&v| used.set(v)).for_each(|v| _ = shared.set(v));
+                Ok(())
+            })?;
+            let uses = collect(cx.run, leaves.len(), &|i| {
+                let own = vertices(i)?.into_iter().filter(|&v| shared.has(v));
+                Ok(own.map(|v| (v, leaves[i].0)).collect::<Vec<(u32, u32)>>())
+            })?;
+            let mut uses = uses.concat();
+            uses.sort_unstable();
+            let span = |run: &[(u32, u32)]| ((ObjectId(o as u32), run[0].0), [run[0].1, run[run.len() - 1].1]);
+            Ok(uses.chunk_by(|a, b| a.0 == b.0).map(span).collect())
         };
-        let mut spans: HashMap<(ObjectId, u32), [u32; 2]> = HashMap::new();
-        for (name, [a, b]) in collect(cx.run, scene.objects.len(), &of_object)?.into_iter().flatten() {
-            let span = spans.entry(name).or_insert([a, a]);
-            *span = [span[0].min(a).min(b), span[1].max(a).max(b)];
-        }
-        Ok(Self(spans))
+        Ok(Self(collect(cx.run, scene.objects.len(), &of_object)?.concat()))
     }
 
     /// The first and the last leaf that use a vertex of the leaf `own`.
     pub(crate) fn span(&self, name: (ObjectId, u32), own: u32) -> [u32; 2] {
-        self.0.get(&name).copied().unwrap_or([own; 2])
+        self.0.binary_search_by_key(&name, |s| s.0).map_or([own; 2], |i| self.0[i].1)
+    }
+}
+
+/// A bit a number, set from many threads.
+struct Bits(Vec<AtomicU64>);
+
+impl Bits {
+    fn new(count: u32) -> Self {
+        Self((0..count.div_ceil(64)).map(|_| AtomicU64::new(0)).collect())
+    }
+
+    /// Sets a bit and tells whether it was set.
+    fn set(&self, bit: u32) -> bool {
+        let mask = 1 << (bit % 64);
+        self.0[bit as usize / 64].fetch_or(mask, Ordering::Relaxed) & mask != 0
+    }
+
+    fn has(&self, bit: u32) -> bool {
+        self.0[bit as usize / 64].load(Ordering::Relaxed) & (1 << (bit % 64)) != 0
     }
 }
