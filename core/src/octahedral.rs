@@ -22,7 +22,8 @@ pub fn vector(code: [i16; 2], bits: u32) -> Vec3 {
     let at = Vec2::new(f32::from(code[0]), f32::from(code[1])) / half(bits);
     let z = 1.0 - at.x.abs() - at.y.abs();
     let back = if z < 0.0 { folded(at) } else { at };
-    Vec3::new(back.x, back.y, z).normalize()
+    // Without a negative zero, which would be no code's vector any more.
+    Vec3::new(back.x + 0.0, back.y + 0.0, z).normalize()
 }
 
 /// The vector that stands for another once it is stored.
@@ -53,6 +54,17 @@ mod tests {
             let r = rounded(n, FINE_BITS);
             prop_assert!(n.cross(r).length().atan2(n.dot(r)) < 1.0 / 510.0);
             prop_assert_eq!(rounded(r, FINE_BITS), r, "what is rounded stays");
+        }
+    }
+
+    #[test]
+    fn what_is_rounded_stays_bit_for_bit() {
+        for bits in [8, 10, FINE_BITS] {
+            let most = half(bits) as i16;
+            for code in (-most..=most).flat_map(|x| [[x, most], [x, -most], [most, x], [-most, x], [x, most - x.abs()], [x, 0]]) {
+                let n = vector(code, bits);
+                assert_eq!(rounded(n, bits).to_array().map(f32::to_bits), n.to_array().map(f32::to_bits), "{code:?}");
+            }
         }
     }
 
