@@ -61,7 +61,9 @@ mod tests {
     fn what_is_rounded_stays_bit_for_bit() {
         for bits in [8, 10, FINE_BITS] {
             let most = half(bits) as i16;
-            for code in (-most..=most).flat_map(|x| [[x, most], [x, -most], [most, x], [-most, x], [x, most - x.abs()], [x, 0]]) {
+            for code in
+                (-most..=most).flat_map(|x| [[x, most], [x, -most], [most, x], [-most, x], [x, most - x.abs()], [x, 0]])
+            {
                 let n = vector(code, bits);
                 assert_eq!(rounded(n, bits).to_array().map(f32::to_bits), n.to_array().map(f32::to_bits), "{code:?}");
             }

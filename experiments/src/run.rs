@@ -220,10 +220,6 @@ pub fn build(experiment: &Experiment, options: &Options<'_>) -> Result<String, F
 pub fn run(experiment: &Experiment, out: &Path, options: &Options<'_>) -> Result<String, Failure> {
     let backends = device::choose(&experiment.pipelines, &mut |line| (options.say)(&line))?;
     let prepared = prepare(experiment, options)?;
-    if let Some(why) = too_large(&prepared.scene, prepared.limit_bytes).filter(|_| experiment.measure.surface_distance)
-    {
-        return Err(Failure::input("[measure] surface_distance compares with the scene's surface", why));
-    }
     let store = open_store(options)?;
     let all: Vec<usize> = (0..experiment.pipelines.len()).collect();
     let capture = captures(experiment, &prepared, &all)?;

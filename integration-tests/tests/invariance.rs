@@ -53,7 +53,7 @@ fn experiment(scale: f64, offset: f64) -> String {
         hybrid("quadric", "collapse = { type = \"quadric\" }"),
         hybrid("appearance", "collapse = { type = \"appearance\" }"),
         alone("clusters", "cluster-lod", "cluster_triangles = 32, group_clusters = 8, max_px = 1.0"),
-        alone("nodes", "point-polygon-hlod", "node_triangles = 500, resolution = 64, max_px = 1.0"),
+        alone("nodes", "point-polygon-hlod", "node_triangles = 500, resolution = 64, max_px = 8.0, grid_steps = 4096"),
         eye = 1.5 * scale,
     )
 }

@@ -234,8 +234,11 @@ fn unpacked_mesh(p: &Packed) -> Result<MeshPart, Fault> {
     Ok(MeshPart { positions, normals, albedo, indices, two_sided: false })
 }
 
-/// Positions, normals and albedo of vertices that `indices` use in their order.
-fn unpacked_vertices(p: &Packed, indices: &[u32]) -> Result<(Vec<Vec3>, Vec<Vec3>, Vec<[u8; 4]>), Fault> {
+/// Positions, normals and albedo.
+type Vertices = (Vec<Vec3>, Vec<Vec3>, Vec<[u8; 4]>);
+
+/// Those of vertices that `indices` use in their order.
+fn unpacked_vertices(p: &Packed, indices: &[u32]) -> Result<Vertices, Fault> {
     let n = p.vertices as usize;
     let floats = |bytes: &[u8]| -> Result<Vec<Vec3>, Fault> {
         Ok(coded(meshopt::decode_vertex_buffer::<[f32; 3]>(bytes, n))?.into_iter().map(Vec3::from).collect())
