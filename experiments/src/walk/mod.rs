@@ -220,7 +220,8 @@ impl<'a> Walker<'a> {
         let waited = self.arrive()?;
         let (mut asked, cells) = self.plan(camera, cell);
         let from_memory = self.upload_from_memory(&mut asked)?;
-        let now = first || self.limit.is_none();
+        // What others are compared with waits for what it lacks.
+        let now = first || self.strict || self.limit.is_none();
         let mut uploaded_bytes = waited + from_memory;
         if now {
             uploaded_bytes = waited + self.fetch(&asked, from_memory, true)?;
