@@ -351,7 +351,7 @@ impl One<'_> {
         if let Some(scene) = self.surface {
             walker.compare_surfaces(scene);
         }
-        if self.is_reference() {
+        if self.is_compared_with() {
             walker = walker.strict();
         }
         let metrics = Metrics { ssim: e.measure.ssim, flip: e.measure.flip };
