@@ -200,6 +200,7 @@ fn what_holds_all_triangles_at_once_is_refused_and_says_what_to_set() {
     let csv = "time_s,x,y,z,yaw_deg,pitch_deg\n0,0,0,100,90,0\n1,0,0,-100,-90,0\n";
     std::fs::write(f.path("path.csv"), csv).unwrap();
     let along = two.replace("path = \"orbit\"\nframes = 4", "path = \"path.csv\"\nframes_per_s = 1\nframes = 2");
+    let along = along.replace("memory_bytes = 16_777_216", "memory_bytes = 25_165_824");
     std::fs::write(f.path("large.toml"), along).unwrap();
     f.ok(&["run", "large.toml", "--quiet", "--out", "along"]);
     let drawn = column(&f, "along", "near_triangles");
