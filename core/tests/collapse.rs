@@ -235,6 +235,67 @@ impl Cost for Hostile {
     }
 }
 
+/// Quadrics that find at the end that some triangles have become too long.
+struct TooLong<'a> {
+    quadrics: Quadrics,
+    indices: &'a [u32],
+    /// How often it was asked.
+    rounds: usize,
+}
+
+impl TooLong<'_> {
+    fn off(&self, t: usize, corners: [u32; 3], at: impl Fn(u32) -> Vec3) -> f32 {
+        let [a, b, c] = corners.map(at);
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        if corners == [0, 1, 2].map(|k| self.indices[3 * t + k]) { 0.0 } else { longest }
+    }
+}
+
+impl Cost for TooLong<'_> {
+    fn costs(&mut self, mesh: &LiveMesh, edges: &[[u32; 2]], out: &mut [Candidate]) {
+        self.quadrics.costs(mesh, edges, out);
+    }
+    fn collapsed(&mut self, mesh: &LiveMesh, from: u32, onto: u32, at: Vec3) {
+        self.quadrics.collapsed(mesh, from, onto, at);
+    }
+    fn verifies(&self) -> bool {
+        true
+    }
+    fn verify(&mut self, mesh: &LiveMesh) -> Vec<f32> {
+        self.rounds += 1;
+        let living = |t: usize| mesh.is_alive(t as u32);
+        let off = |t: usize| if living(t) { self.off(t, mesh.corners(t as u32), |v| mesh.position(v)) } else { 0.0 };
+        (0..mesh.all_triangles()).map(off).collect()
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    #[test]
+    fn what_goes_too_far_is_taken_back_and_leaves_a_sound_mesh(seed in 0u64..1_000_000) {
+        let ((positions, indices), locked, mut rng) = any_mesh(seed);
+        let batched = rng.random();
+        let mode = if batched { Mode::Batched } else { Mode::Exact };
+        let settings = Settings { mode, max_cost: rng.random_range(0.3..3.0), ..any_settings(&mut rng) };
+        let live = LiveMesh::new(&positions, &indices, &locked).unwrap();
+        let half = QuadricSettings { placement: Placement::HalfEdge, ..Default::default() };
+        let free = collapse(live.clone(), &mut Quadrics::new(&live, half), &settings);
+        let mut cost = TooLong { quadrics: Quadrics::new(&live, half), indices: &indices, rounds: 0 };
+        let out = collapse(live, &mut cost, &settings);
+        check_sound(&(positions.clone(), indices.clone()), &locked, &out);
+        let off = |(t, corners): (&u32, &[u32])| cost.off(*t as usize, [0, 1, 2].map(|k| corners[k]), |v| positions[v as usize]);
+        let all = out.triangles.iter().zip(out.indices.chunks_exact(3)).map(off);
+        let most = all.fold(0f32, f32::max);
+        prop_assert!(most <= out.max_cost.max(0.0) && out.max_cost <= settings.max_cost, "{most} {}", out.max_cost);
+        prop_assert!(out.collapses <= free.collapses && (cost.rounds > 1) == (out.collapses < free.collapses));
+        // Edges have as many triangles as before, closed surfaces stay closed.
+        if seed % 4 == 0 && settings.link_condition {
+            prop_assert!(edges(&out.indices).values().all(|&n| n == 2) && euler(&out.indices) == 0);
+        }
+    }
+}
+
 #[test]
 fn costs_that_answer_nonsense_are_survived() {
     for seed in 0..200 {

@@ -205,7 +205,7 @@ fn every_choice_and_every_nested_strategy_of_a_far_field_runs() {
 fn one_view_and_several_both_run_with_either_metric_and_either_reading() {
     let folder = stones::folder();
     let hex = table(of(Kind::Partition).iter().find(|e| e.name == "hex-cells").unwrap(), "");
-    let textured = |more: String| format!("{{ type = \"textured-lod-mesh\", edge_px = 0.75, {more} }}");
+    let textured = |more: String| format!("{{ type = \"textured-lod-mesh\", edge_px = 1.0, {more} }}");
     let mut far = vec![];
     for max_px in ["0.0", "1e9"] {
         for metric in of(Kind::SimplificationMetric) {

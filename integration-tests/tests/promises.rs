@@ -404,7 +404,7 @@ fn check(name: &str, scene: &str, samples: usize, views: usize) -> u64 {
         beyond += (found.beyond + found.made_of.beyond) as u64;
         // Looks are compared in the vertices that a node is made of; in between, and so for vertices of the original that are gone two levels
         // below, the promise is an estimate.
-        assert!(found.original.beyond * 2500 <= found.original.vertices, "{name}, {metric}: {found:?}");
+        assert!(found.original.beyond * 5000 <= found.original.vertices, "{name}, {metric}: {found:?}");
         assert!(found.most[1] > 0.4, "{name}, {metric}: {found:?}");
         let seen = on_screen(&lab, views, &|c| *c);
         println!("{name}, {metric}, {views} views: {seen:?}");
@@ -496,10 +496,10 @@ fn runs_report_surface_distances_where_they_are_asked_for() {
         let d = bounded.error.unwrap().surface_distance.unwrap();
         println!("{}: {d:?} {:?}", backend.name(), bounded.bounds);
         assert!(d.pixels > 4000 && d.pixels_beyond == 0 && d.p999_px <= d.max_px, "{}: {d:?}", backend.name());
-        assert!(d.max_px > 0.001 && d.max_px < 0.5 + SURFACE_RESOLUTION_PX, "{}: {d:?}", backend.name());
+        assert!(d.max_px > 0.01 && d.max_px < 0.5 + SURFACE_RESOLUTION_PX, "{}: {d:?}", backend.name());
         let [audited] = &bounded.bounds[..] else { panic!("{:?}", bounded.bounds) };
         assert_eq!((audited.quantity, audited.predicted_max), (Quantity::SurfaceDistancePx, 0.5));
-        assert!(audited.samples == 6 && audited.violations == 0 && audited.measured_max > 0.001, "{audited:?}");
+        assert!(audited.samples == 6 && audited.violations == 0 && audited.measured_max > 0.01, "{audited:?}");
         assert!(report.contains("<h2>Surface distance</h2>") && report.contains("surface_distance_px"));
     }
     let (summary, report) = ran(BackendName::Cpu, "").unwrap();
@@ -536,7 +536,6 @@ fn at_the_corner(v: &ViewModel, place: Vec3, to: Vec3, outwards: Vec3, away: f32
 /// Not where chance leads, but where it hurts: the places of a node that are farthest off, seen along the surface, in the corner of a wide picture, from
 /// as near as the node is drawn.
 #[test]
-
 fn places_in_a_pictures_corner_keep_the_promise() {
     let lab = lab("source = \"asteroid\"\ntriangles = 400_000", "metric = { type = \"hausdorff\" }");
     let opened = lab.opened(0).unwrap();

@@ -19,6 +19,7 @@
 use super::mesh::{LiveMesh, others};
 use super::prices::{Bits, Prices};
 use super::rules::Rules;
+use super::undo::{Log, settle};
 use super::{BLOCK, Candidate, Collapsed, Cost, Reach, Settings, resolve};
 
 /// The share of its edges that a pass looks at.
@@ -33,7 +34,8 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
     let mut ends_of_chosen: Vec<[u32; 2]> = Vec::new();
     let rules = Rules::new(&mesh, settings);
     let ring = cost.reach() == Reach::Ring;
-    let mut state = Batched { mesh, cost, rules, ring, stale: Bits::default(), collapses: 0, max_cost: 0.0 };
+    let log = cost.verifies().then(|| Log::new(&mesh));
+    let mut state = Batched { mesh, cost, rules, ring, stale: Bits::default(), log, collapses: 0, max_cost: 0.0 };
     state.stale.clear(state.mesh.vertices());
     let mut starved = false;
     while state.mesh.live_triangles() > settings.min_triangles {
@@ -101,8 +103,7 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
         }
         starved = done * 8 < found || done == 0;
     }
-    let total = if state.collapses > 0 { state.cost.total(&state.mesh, state.max_cost) } else { 0.0 };
-    state.mesh.finish(state.collapses, total)
+    state.finish(settings)
 }
 
 struct Batched<'a, C: ?Sized> {
@@ -113,6 +114,8 @@ struct Batched<'a, C: ?Sized> {
     ring: bool,
     /// Where they do: vertices in whose rings something collapsed since their edges were priced.
     stale: Bits,
+    /// Where the cost looks everything over at the end.
+    log: Option<Log>,
     collapses: usize,
     max_cost: f32,
 }
@@ -128,6 +131,13 @@ impl<C: Cost + ?Sized> Batched<'_, C> {
         }
     }
 
+    fn finish(mut self, settings: &Settings) -> Collapsed {
+        if let Some(log) = &mut self.log {
+            (self.collapses, self.max_cost) = settle(&mut self.mesh, self.cost, log, settings, self.max_cost);
+        }
+        self.mesh.finish(self.collapses, self.max_cost)
+    }
+
     /// Collapses an edge if it may be.
     fn take(&mut self, ends: [u32; 2], &Candidate { cost, place }: &Candidate) -> bool {
         if cost.is_nan() || cost == f32::INFINITY || !self.rules.allow(&self.mesh, ends, place) {
@@ -135,6 +145,7 @@ impl<C: Cost + ?Sized> Batched<'_, C> {
         }
         let (from, onto, at) = resolve(&self.mesh, ends, place);
         self.cost.collapsed(&self.mesh, from, onto, at);
+        self.log.iter_mut().for_each(|l| l.collapse(&self.mesh, from));
         self.mesh.apply(from, onto, at);
         if self.ring {
             self.stale.insert(onto);

@@ -12,6 +12,7 @@ use super::prices::Bits;
 use super::queue::Queue;
 use super::rules::Rules;
 use super::spots::Spots;
+use super::undo::{Log, settle};
 use super::{BLOCK, Candidate, Collapsed, Cost, Reach, Settings, resolve};
 
 struct Exact<'a, C: ?Sized> {
@@ -59,6 +60,7 @@ impl Prices {
 pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Settings) -> Collapsed {
     let mut rules = Rules::new(&mesh, settings);
     let mut state = Exact::new(mesh, cost, settings.max_cost);
+    let mut log = state.cost.verifies().then(|| Log::new(&state.mesh));
     let (mut collapses, mut max_cost) = (0, 0f32);
     while state.mesh.live_triangles() > settings.min_triangles
         && let Some((edge, price)) = state.queue.pop()
@@ -74,13 +76,16 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
         let (from, onto, at) = resolve(&state.mesh, ends, best[0].place);
         state.cost.collapsed(&state.mesh, from, onto, at);
         state.merge_edges(edge, from, onto);
+        log.iter_mut().for_each(|l| l.collapse(&state.mesh, from));
         state.mesh.apply(from, onto, at);
         state.reprice(onto);
         collapses += 1;
         max_cost = max_cost.max(price);
     }
-    let total = if collapses > 0 { state.cost.total(&state.mesh, max_cost) } else { 0.0 };
-    state.mesh.finish(collapses, total)
+    if let Some(log) = &mut log {
+        (collapses, max_cost) = settle(&mut state.mesh, state.cost, log, settings, max_cost);
+    }
+    state.mesh.finish(collapses, max_cost)
 }
 
 impl<'a, C: Cost + ?Sized> Exact<'a, C> {

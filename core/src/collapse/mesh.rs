@@ -241,6 +241,22 @@ impl LiveMesh {
         stays.flags |= flags & (BORDER | ODD);
     }
 
+    /// Whom a vertex died into.
+    pub(super) fn died_into(&self, vertex: u32) -> u32 {
+        self.vertices[vertex as usize].remap
+    }
+
+    /// A triangle as it was; lists stay as they are.
+    pub(super) fn restore_triangle(&mut self, triangle: u32, corners: [u32; 3]) {
+        self.live += !self.is_alive(triangle) as usize;
+        self.triangles[triangle as usize] = corners;
+    }
+
+    /// A dead vertex lives again; lists stay as they are.
+    pub(super) fn restore_vertex(&mut self, vertex: u32) {
+        self.vertices[vertex as usize].remap = vertex;
+    }
+
     fn unlist(&mut self, vertex: u32, triangle: u32) {
         let Vertex { start, len, .. } = &mut self.vertices[vertex as usize];
         let run = &mut self.lists[*start as usize..(*start + *len) as usize];

@@ -53,6 +53,7 @@ mod queue;
 mod rings;
 mod rules;
 mod spots;
+mod undo;
 
 use glam::Vec3;
 
@@ -107,11 +108,16 @@ pub trait Cost {
         let _ = (mesh, from, onto, at);
     }
 
-    /// What all that was collapsed costs together, where the dearest edge cost `dearest`; asked once, at the end. A cost that prices edges by
-    /// samples may measure here what has become of the whole. Default: `dearest`.
-    fn total(&mut self, mesh: &LiveMesh, dearest: f32) -> f32 {
-        let _ = mesh;
-        dearest
+    /// Whether its prices are estimates that [`Cost::verify`] looks over at the end. Then survivors may only sit where they sat. Default: no.
+    fn verifies(&self) -> bool {
+        false
+    }
+
+    /// What each triangle is off by, in the cost's unit, in the order of the input; dead ones count nothing. Asked at the end, where it
+    /// [`Cost::verifies`]: the collapses that made triangles which are off by more than [`Settings::max_cost`] are taken back, and it is asked again.
+    /// Of `mesh` the corners of triangles, their being alive and positions are valid, not the triangles of vertices. Default: nothing is off.
+    fn verify(&mut self, mesh: &LiveMesh) -> Vec<f32> {
+        vec![0.0; mesh.all_triangles()]
     }
 
     /// How far a collapse changes costs. Default: [`Reach::Ends`].
@@ -171,7 +177,8 @@ pub struct Collapsed {
     pub remap: Vec<u32>,
     /// Number of edges collapsed.
     pub collapses: usize,
-    /// The highest cost paid or, where the cost measures the whole ([`Cost::total`]), that; in its unit; 0 where nothing was collapsed.
+    /// The highest cost paid or, where it is more, what the cost found at the end ([`Cost::verify`]), never above [`Settings::max_cost`]; in its
+    /// unit; 0 where nothing was collapsed.
     pub max_cost: f32,
 }
 

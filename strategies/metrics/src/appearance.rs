@@ -178,6 +178,24 @@ mod tests {
     }
 
     #[test]
+    fn what_has_no_triangle_to_lie_on_keeps_its_looks() {
+        // A flap of two triangles back to back on the edge of two others: its tip looks otherwise.
+        let positions = [Vec3::ZERO, Vec3::X, Vec3::new(0.5, 1.0, 0.0), Vec3::new(0.5, -0.01, 0.0)];
+        let indices = [0, 1, 2, 0, 2, 1, 0, 3, 1, 1, 3, 0];
+        let mut normals = [Vec3::Z; 4];
+        normals[3] = Vec3::new(0.0, 0.6, 0.8);
+        let simplify = |normals: &[Vec3]| {
+            let mesh = MeshView { positions: &positions, normals, albedo: &[], indices: &indices };
+            let px = |a: Vec3, b: Vec3| a.distance(b);
+            let (mut cost, max_cost) = Appearance::default().begin(mesh, &[], &px, 0.9).unwrap();
+            let settings = Settings { max_cost, link_condition: false, max_turn_rad: 4.0, ..Settings::default() };
+            let live = LiveMesh::new(&positions, &indices, &[true, true, true, false]).unwrap();
+            collapse(live, cost.as_mut(), &settings).remap[3]
+        };
+        assert_eq!(simplify(&normals), 3);
+    }
+
+    #[test]
     fn a_dead_vertex_keeps_its_say() {
         // A strip whose normals swing more and more: what died early still bounds what is collapsed late.
         let (positions, indices) = plane(10);

@@ -2,7 +2,7 @@
 //!
 //! Every dead vertex is kept under the triangle that covers it and looked at again whenever that triangle changes, so that prices are
 //! distances from the original, never sums of steps: what one collapse moves up and the next one down costs the larger of the two. Between vertices
-//! a price is an estimate; at the end [`two_sided`] measures a bound of the whole.
+//! a price is an estimate; at the end [`Measure`] finds a bound of the whole.
 //!
 //! A patch, the triangles that a collapse moves, is projected onto the plane across the sum of the old triangles' areas; a vertex lies
 //! under the new triangle that covers it there. Where the projection folds, or nothing covers it (a border that moved), it lies under
@@ -14,13 +14,13 @@ use farfield_core::strategy::MeshView;
 use glam::{Vec2, Vec3};
 
 use crate::appearance::Looks;
-use crate::measured::two_sided;
+use crate::measured::Measure;
 
 /// How far parts of an edge or of a triangle may lie outside it after rounding.
 const ROUNDING: f32 = 1e-4;
-/// What is added for what lies between vertices: on scans the bound of the whole was up to 1.5 times what vertices gave, but for a few
-/// triangles in a hundred less than 1.1 times.
-pub(crate) const MARGIN: f32 = 1.25;
+/// What is kept free for what lies between vertices: on scans the bound of the whole was up to 1.5 times what vertices gave, but for a few
+/// triangles in a hundred less than 1.1 times. What turns out to need more is taken back.
+pub(crate) const MARGIN: f32 = 1.1;
 /// No vertex.
 const NONE: u32 = u32::MAX;
 
@@ -35,6 +35,7 @@ pub(crate) struct Deviation<'a> {
     /// Vertices that died on a border.
     border: Vec<bool>,
     patch: Patch,
+    measure: Option<Measure<'a>>,
 }
 
 /// For each triangle the dead vertices that it covers: lists through the vertices.
@@ -102,7 +103,7 @@ impl<'a> Deviation<'a> {
     ) -> Self {
         let under = Under { first: vec![NONE; mesh.indices.len() / 3], next: vec![NONE; mesh.positions.len()] };
         let border = vec![false; mesh.positions.len()];
-        Self { px, most, mesh, looks, under, border, patch: Patch::default() }
+        Self { px, most, mesh, looks, under, border, patch: Patch::default(), measure: None }
     }
 
     /// The most pixels that a length takes at a place.
@@ -124,39 +125,42 @@ impl<'a> Deviation<'a> {
         if most > limit {
             return f32::INFINITY;
         }
-        if self.patch.normal != Vec3::ZERO {
-            most = self.patch.crossed(p);
-            if most > limit {
-                return f32::INFINITY;
-            }
-        }
-        let mut off = |v: u32, bordering: bool| {
+        let off = |v: u32, bordering: bool| {
             let foot = self.patch.foot(mesh, self.mesh.positions, self.looks.as_ref(), v);
-            let mut off = foot.map_or(length, |(_, off)| off);
+            // Where no triangle moves nothing is left to show what it looks like.
+            let lost = if self.looks.is_some() { f32::INFINITY } else { length };
+            let mut off = foot.map_or(lost, |(_, off)| off);
             if bordering && !self.patch.edges.is_empty() {
                 let p = self.mesh.positions[v as usize];
                 let edges = self.patch.edges.iter().map(|&[a, b]| from_segment(p, mesh.position(a), mesh.position(b)));
                 off = off.max(edges.fold(f32::INFINITY, f32::min));
             }
-            most = most.max(off);
-            off <= limit
+            off
         };
         // The dying vertex decides most often.
-        if !off(from, true) {
+        most = most.max(off(from, true));
+        if most > limit {
             return f32::INFINITY;
+        }
+        if self.patch.normal != Vec3::ZERO {
+            most = most.max(self.patch.crossed(p));
+            if most > limit {
+                return f32::INFINITY;
+            }
         }
         let at_end = |m: &&Moved| self.patch.end.is_some_and(|e| m.corners.contains(&e));
         let gone = self.patch.gone.iter().map(|&t| (t, true));
         for (t, bordering) in gone.chain(self.patch.moved.iter().map(|m| (m.triangle, at_end(&m)))) {
             let mut v = self.under.first[t as usize];
             while v != NONE {
-                if !off(v, bordering && self.border[v as usize]) {
+                most = most.max(off(v, bordering && self.border[v as usize]));
+                if most > limit {
                     return f32::INFINITY;
                 }
                 v = self.under.next[v as usize];
             }
         }
-        let cost = most * scale * MARGIN;
+        let cost = most * scale;
         if cost.is_finite() { cost } else { f32::INFINITY }
     }
 }
@@ -206,21 +210,25 @@ impl Cost for Deviation<'_> {
         patch.covered = covered;
     }
 
-    /// A bound of the two-sided distance, where that is more than what the vertices gave.
-    fn total(&mut self, mesh: &LiveMesh, dearest: f32) -> f32 {
+    fn verifies(&self) -> bool {
+        true
+    }
+
+    /// A bound of the two-sided distance.
+    fn verify(&mut self, mesh: &LiveMesh) -> Vec<f32> {
         let length = |t: u32| mesh.position(mesh.corners(t)[0]).distance(mesh.position(mesh.corners(t)[1]));
         let scale = |t: u32| self.pixels(mesh.position(mesh.corners(t)[0]), length(t)) / length(t);
         let living = || (0..mesh.all_triangles() as u32).filter(|&t| mesh.is_alive(t));
-        // How fine is measured goes by what was paid, at the most pixels a length.
+        // How fine is measured goes by what may be paid, at the most pixels a length.
         let scale = living().map(scale).filter(|s| s.is_finite()).fold(0.0, f32::max);
-        let fine = if scale > 0.0 { dearest / (MARGIN * scale) } else { 0.0 };
-        let off = two_sided(mesh, self.mesh.positions, self.mesh.indices, fine);
-        living()
-            .filter(|&t| off[t as usize] > 0.0)
-            .map(|t| {
-                mesh.corners(t).map(|v| self.pixels(mesh.position(v), off[t as usize])).into_iter().fold(0.0, f32::max)
-            })
-            .fold(dearest, f32::max)
+        let fine = if scale > 0.0 { self.most / scale } else { 0.0 };
+        let measure = self.measure.get_or_insert_with(|| Measure::new(self.mesh.positions, self.mesh.indices));
+        let mut off = measure.off(mesh, fine);
+        for t in living().filter(|&t| off[t as usize] > 0.0).collect::<Vec<_>>() {
+            let px = mesh.corners(t).map(|v| self.pixels(mesh.position(v), off[t as usize]));
+            off[t as usize] = px.into_iter().fold(0.0, f32::max);
+        }
+        off
     }
 
     fn reach(&self) -> Reach {

@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(simplified(&positions, &indices, 0.99 * most, Settings::default()).indices.len(), 12);
         let out = simplified(&positions, &indices, 1.01 * most, Settings::default());
         assert_eq!(out.indices.len(), 6);
-        assert!((out.max_cost - most).abs() < 1e-6, "{}", out.max_cost);
+        assert!((out.max_cost - 0.75).abs() < 1e-6, "{}", out.max_cost);
     }
 
     #[test]
@@ -135,7 +135,7 @@ mod tests {
             let out =
                 collapse(LiveMesh::new(&positions, &indices, &locked).unwrap(), cost.as_mut(), &Settings::default());
             assert_eq!(out.indices.len(), 12);
-            assert!((out.max_cost - 0.2 * MARGIN).abs() < 1e-4, "turned {i}: {}", out.max_cost);
+            assert!((out.max_cost - 0.2).abs() < 1e-4, "turned {i}: {}", out.max_cost);
         }
     }
 
@@ -170,12 +170,12 @@ mod tests {
             };
             let out = simplified(&positions, &indices, most, settings);
             let bound = out.max_cost * (1.0 + 1e-4) + 1e-6;
-            prop_assert!(out.indices.len() < indices.len());
+            prop_assert!(out.max_cost <= most && out.indices.len() < indices.len());
             let there = sampled(&positions, &indices, &out.indices, 4);
             let back = sampled(&positions, &out.indices, &indices, 12);
             prop_assert!(there.max(back) <= bound, "{there} {back} {bound}");
             // Nor is it much more than what is found.
-            prop_assert!(out.max_cost <= 2.0 * there.max(back).max(0.5 * most), "{there} {back} {}", out.max_cost);
+            prop_assert!(out.max_cost <= 1.5 * there.max(back).max(0.5 * most), "{there} {back} {}", out.max_cost);
         }
     }
 }

@@ -17,62 +17,104 @@ use glam::Vec3;
 
 /// No triangle.
 const NONE: u32 = u32::MAX;
-/// Pieces are divided so many times at most.
-const DEPTH: u32 = 4;
-/// The same where a new triangle may cross many.
-const FOLDED_DEPTH: u32 = 10;
+/// Parts of the original are cut by so many new triangles at most.
+const CUTS: u32 = 4;
+/// Pieces that may lie anywhere are divided so many times at most.
+const DEPTH: u32 = 14;
 /// Of what is allowed, a part that is not worth a division.
 const FINE: f32 = 0.25;
 /// How much too far a piece's bound may be.
 const SLACK: f32 = 1.1;
-/// Heights of more than so many times what is allowed are looked into.
-const STEEP: f32 = 1.0;
 /// What may be missing of a triangle's area that counts as covered: rounding.
 const ROUNDING: f32 = 1e-3;
 
-/// For each triangle of `mesh` a distance d, scene units: none of its points is farther than d from the original surface, and every point
-/// of the original is within the d of some triangle of that triangle. Dead triangles have 0, and so have those that stand for themselves
-/// alone. None of the original's vertices has moved; `allowed` says how fine is worth it. O(n log n) for n triangles of the original.
-pub(crate) fn two_sided(mesh: &LiveMesh, positions: &[Vec3], original: &[u32], allowed: f32) -> Vec<f32> {
-    let mut out = vec![0f32; mesh.all_triangles()];
-    let corners = |t: u32| [0, 1, 2].map(|k| original[3 * t as usize + k]);
-    let at = |c: [u32; 3]| c.map(|v| positions[v as usize]);
-    let same = |t: u32| mesh.is_alive(t) && mesh.corners(t) == corners(t);
-    let living: Vec<u32> = (0..mesh.all_triangles() as u32).filter(|&t| mesh.is_alive(t)).collect();
-    let was = Surface { positions, indices: original, tree: OnceCell::new() };
-    let mut sheet = Sheet::new(positions.len(), original);
-    // Which original triangles lie over or under which new ones.
-    let mut pairs: Vec<[u32; 2]> = vec![];
-    for &t in living.iter().filter(|&&t| !same(t)) {
-        let over = sheet.covering(mesh.corners(t), positions, original).unwrap_or(f32::INFINITY);
-        // A steep sliver sees what is far along its normal.
-        let far = &mut out[t as usize];
-        if over > STEEP * allowed {
-            was.pieces(Piece::new(at(mesh.corners(t))), FOLDED_DEPTH, allowed, &mut |_, d| *far = far.max(d));
+/// Measures again and again what a mesh is off by, as collapses are taken back: only where it has changed.
+pub(crate) struct Measure<'a> {
+    was: Surface<'a>,
+    sheet: Sheet,
+    /// Triangles as they were measured last; dead ones name no vertices.
+    corners: Vec<[u32; 3]>,
+    /// How far each is from the original.
+    back: Vec<f32>,
+    /// Which original triangles lie over or under which ones; sorted.
+    pairs: Vec<[u32; 2]>,
+    /// How far a part of an original triangle is from a triangle.
+    there: Vec<(u32, u32, f32)>,
+}
+
+impl<'a> Measure<'a> {
+    /// Of three vertices a triangle, before anything collapsed.
+    pub(crate) fn new(positions: &'a [Vec3], original: &'a [u32]) -> Self {
+        Self {
+            was: Surface { positions, indices: original, tree: OnceCell::new() },
+            sheet: Sheet::new(positions.len(), original),
+            corners: original.as_chunks::<3>().0.to_vec(),
+            back: vec![0.0; original.len() / 3],
+            pairs: vec![],
+            there: vec![],
         }
-        *far = if *far > 0.0 { far.min(over) } else { over };
-        pairs.extend(sheet.found.iter().map(|&o| [o, t]));
     }
-    pairs.sort_unstable();
-    let left: Vec<u32> = living.iter().flat_map(|&t| mesh.corners(t)).collect();
-    let is = Surface { positions, indices: &left, tree: OnceCell::new() };
-    let mut next = 0;
-    for o in (0..original.len() as u32 / 3).filter(|&o| !same(o)) {
-        next += pairs[next..].partition_point(|p| p[0] < o);
-        let run = &pairs[next..next + pairs[next..].partition_point(|p| p[0] == o)];
-        let mut keep = |t: u32, d: f32| out[t as usize] = out[t as usize].max(d);
-        let whole = Piece::new(at(corners(o)));
-        // Where it lies over none, or nearer to one that it does not lie over.
-        let mut left = vec![];
-        if run.is_empty() {
-            left.push(whole);
+
+    /// For each triangle of `mesh`, which was made of the original and whose vertices have not moved, a distance d, scene units: none of its points is
+    /// farther than d from the original surface, and every point of the original is within the d of some triangle of that triangle.
+    /// Dead triangles have 0, and so have those that stand for themselves alone. `allowed` says how fine is worth it. O(n log n) for n triangles of
+    /// the original at first, then for those that have changed.
+    pub(crate) fn off(&mut self, mesh: &LiveMesh, allowed: f32) -> Vec<f32> {
+        let (positions, original) = (self.was.positions, self.was.indices);
+        let at = |c: [u32; 3]| c.map(|v| positions[v as usize]);
+        let whole = |o: u32| [0, 1, 2].map(|k| original[3 * o as usize + k]);
+        let all = 0..mesh.all_triangles() as u32;
+        let now: Vec<[u32; 3]> =
+            all.clone().map(|t| if mesh.is_alive(t) { mesh.corners(t) } else { [NONE; 3] }).collect();
+        let same = |t: u32| now[t as usize] == whole(t);
+        let changed: Vec<bool> = now.iter().zip(&self.corners).map(|(a, b)| a != b).collect();
+        // Originals that are to be compared anew: their triangle, or one that they were compared with, has changed.
+        let mut anew = changed.clone();
+        self.pairs.iter().filter(|p| changed[p[1] as usize]).for_each(|p| anew[p[0] as usize] = true);
+        self.there.iter().filter(|w| changed[w.1 as usize]).for_each(|w| anew[w.0 as usize] = true);
+        self.pairs.retain(|p| !changed[p[1] as usize]);
+        for t in all.clone().filter(|&t| changed[t as usize]) {
+            let far = &mut self.back[t as usize];
+            *far = 0.0;
+            if !mesh.is_alive(t) || same(t) {
+                continue;
+            }
+            let over = self.sheet.covering(mesh.corners(t), positions, original).unwrap_or(f32::INFINITY);
+            // A steep sliver sees what is far along its normal.
+            if over > allowed {
+                self.was.pieces(Piece::new(at(mesh.corners(t))), DEPTH, allowed, &mut |_, d| *far = far.max(d));
+            }
+            *far = if *far > 0.0 { far.min(over) } else { over };
+            self.sheet.found.iter().for_each(|&o| anew[o as usize] = true);
+            self.pairs.extend(self.sheet.found.iter().map(|&o| [o, t]));
         }
-        among(whole, DEPTH, run, &|t| at(mesh.corners(t)), allowed, &mut |piece, t, d| {
-            if d > STEEP * allowed { left.push(piece) } else { keep(t, d) }
-        });
-        left.into_iter().for_each(|p| is.pieces(p, FOLDED_DEPTH, allowed, &mut |t, d| keep(living[t as usize], d)));
+        self.pairs.sort_unstable();
+        self.there.retain(|w| !anew[w.0 as usize]);
+        let living: Vec<u32> = all.clone().filter(|&t| mesh.is_alive(t)).collect();
+        let left: Vec<u32> = living.iter().flat_map(|&t| mesh.corners(t)).collect();
+        let is = Surface { positions, indices: &left, tree: OnceCell::new() };
+        let mut next = 0;
+        for o in all.filter(|&o| anew[o as usize] && !same(o)) {
+            next += self.pairs[next..].partition_point(|p| p[0] < o);
+            let run = &self.pairs[next..next + self.pairs[next..].partition_point(|p| p[0] == o)];
+            let original = Piece::new(at(whole(o)));
+            // Where it lies over none, or nearer to one that it does not lie over.
+            let mut rest = vec![];
+            if run.is_empty() {
+                rest.push(original);
+            }
+            among(original, CUTS, run, &|t| at(mesh.corners(t)), allowed, &mut |piece, t, d| {
+                if d > allowed { rest.push(piece) } else { self.there.push((o, t, d)) }
+            });
+            for p in rest {
+                is.pieces(p, DEPTH, allowed, &mut |t, d| self.there.push((o, living[t as usize], d)));
+            }
+        }
+        self.corners = now;
+        let mut out = self.back.clone();
+        self.there.iter().for_each(|&(_, t, d)| out[t as usize] = out[t as usize].max(d));
+        out
     }
-    out
 }
 
 /// The distance of a point from a triangle, rounded up.
@@ -93,9 +135,8 @@ fn among(
     if piece.count == 0 || run.is_empty() {
         return;
     }
-    // Of each corner the nearest triangle, of each triangle the farthest corner; of the middle the nearest triangle.
-    let (mut near, mut best, mut host) = ([f32::INFINITY; CORNERS], (f32::INFINITY, NONE), (f32::INFINITY, NONE));
-    let middle = piece.middle();
+    // Of each corner the nearest triangle, of each triangle the farthest corner.
+    let (mut near, mut best) = ([f32::INFINITY; CORNERS], (f32::INFINITY, NONE));
     for &[_, t] in run {
         let there = triangle(t);
         let mut far = 0f32;
@@ -106,16 +147,18 @@ fn among(
         if far < best.0 {
             best = (far, t);
         }
-        let off = distance(middle, there);
-        if off < host.0 {
-            host = (off, t);
-        }
     }
     let (far, t) = best;
     if depth == 0 || far <= FINE * allowed || far <= SLACK * near[..piece.count].iter().copied().fold(0.0, f32::max) {
         return keep(piece, t, far);
     }
-    let (outside, inside) = piece.split(triangle(host.1));
+    let middle = piece.middle();
+    let host = run
+        .iter()
+        .map(|p| p[1])
+        .min_by(|&a, &b| distance(middle, triangle(a)).total_cmp(&distance(middle, triangle(b))));
+    let Some(host) = host else { return };
+    let (outside, inside) = piece.split(triangle(host));
     outside.into_iter().for_each(|p| among(p, depth - 1, run, triangle, allowed, keep));
     among(inside, 0, run, triangle, allowed, keep);
 }
@@ -128,7 +171,8 @@ struct Surface<'a> {
 }
 
 impl Surface<'_> {
-    /// Bounds a piece by the triangle of this surface that is nearest to its middle; where that is not tight, its halves.
+    /// Bounds a piece by the triangle of this surface that is nearest to its middle; where that is not tight, what lies over or under that
+    /// triangle is cut out, if it is of its size, else it is halved.
     fn pieces(&self, piece: Piece, depth: u32, allowed: f32, out: &mut dyn FnMut(u32, f32)) {
         let tree = self.tree.get_or_init(|| TriangleBvh::build(self.positions, self.indices));
         if piece.count == 0 {
@@ -136,11 +180,20 @@ impl Surface<'_> {
         }
         let Some(near) = tree.closest_point(piece.middle(), f32::INFINITY) else { return };
         let there = [0, 1, 2].map(|k| self.positions[self.indices[3 * near.triangle as usize + k] as usize]);
-        let whole = piece.corners().iter().map(|&p| distance(p, there)).fold(0.0, f32::max);
+        let far = |p: &Piece| p.corners().iter().map(|&p| distance(p, there)).fold(0.0, f32::max);
+        let whole = far(&piece);
         if depth == 0 || whole <= FINE * allowed || whole <= SLACK * near.distance {
             return out(near.triangle, whole);
         }
-        piece.halves().into_iter().for_each(|p| self.pieces(p, depth - 1, allowed, out));
+        let (outside, inside) = piece.split(there);
+        let over = far(&inside);
+        let small = piece.longest().0 <= 2.0 * Piece::new(there).longest().0;
+        if small && inside.count > 0 && over <= allowed {
+            out(near.triangle, over);
+            outside.into_iter().for_each(|p| self.pieces(p, depth - 1, allowed, out));
+        } else {
+            piece.halves().into_iter().for_each(|p| self.pieces(p, depth - 1, allowed, out));
+        }
     }
 }
 
@@ -272,12 +325,16 @@ impl Piece {
         (behind, before)
     }
 
+    /// The length of its longest side, and the corner where that begins.
+    fn longest(&self) -> (f32, usize) {
+        let length = |i: usize| self.points[i].distance(self.points[(i + 1) % self.count]);
+        (0..self.count).map(|i| (length(i), i)).fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a })
+    }
+
     /// Cut across its longest side, in the middle.
     fn halves(self) -> [Self; 2] {
-        let side = |i: usize| (self.points[i], self.points[(i + 1) % self.count]);
-        let length = |i: usize| side(i).0.distance_squared(side(i).1);
-        let longest = (0..self.count).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
-        let (p, q) = side(longest);
+        let longest = self.longest().1;
+        let (p, q) = (self.points[longest], self.points[(longest + 1) % self.count]);
         let (behind, before) = self.cut(p.midpoint(q), q - p);
         [behind, before]
     }
