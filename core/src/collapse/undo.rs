@@ -93,8 +93,8 @@ pub(super) fn settle<C: Cost + ?Sized>(
     loop {
         let off = cost.verify(mesh);
         let living = || (0..mesh.all_triangles() as u32).filter(|&t| mesh.is_alive(t));
-        // Written so that NaN is too far.
-        let bad = living().filter(|&t| !(off[t as usize] <= settings.max_cost)).map(|t| log.last[t as usize]);
+        let too_far = |off: f32| off.is_nan() || off > settings.max_cost;
+        let bad = living().filter(|&t| too_far(off[t as usize])).map(|t| log.last[t as usize]);
         let times: BTreeSet<u32> = bad.filter(|&t| t != NONE).collect();
         if times.is_empty() {
             let left = log.of.iter().filter(|&&time| time != NONE).count();
