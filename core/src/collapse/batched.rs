@@ -133,7 +133,7 @@ impl<C: Cost + ?Sized> Batched<'_, C> {
 
     fn finish(mut self, settings: &Settings) -> Collapsed {
         if let Some(log) = &mut self.log {
-            (self.collapses, self.max_cost) = settle(&mut self.mesh, self.cost, log, settings, self.max_cost);
+            (self.collapses, self.max_cost) = settle(&mut self.mesh, self.cost, log, settings);
         }
         self.mesh.finish(self.collapses, self.max_cost)
     }
@@ -146,11 +146,13 @@ impl<C: Cost + ?Sized> Batched<'_, C> {
         let (from, onto, at) = resolve(&self.mesh, ends, place);
         self.cost.collapsed(&self.mesh, from, onto, at);
         self.log.iter_mut().for_each(|l| l.collapse(&self.mesh, from));
-        self.mesh.apply(from, onto, at);
         if self.ring {
-            self.stale.insert(onto);
-            self.mesh.triangles_of(onto).iter().flat_map(|&t| self.mesh.corners(t)).for_each(|x| self.stale.insert(x));
+            // Before it: the third corner of a triangle that vanishes may be no neighbour afterwards.
+            for v in [from, onto] {
+                self.mesh.triangles_of(v).iter().flat_map(|&t| self.mesh.corners(t)).for_each(|x| self.stale.insert(x));
+            }
         }
+        self.mesh.apply(from, onto, at);
         self.collapses += 1;
         self.max_cost = self.max_cost.max(cost);
         true

@@ -83,7 +83,7 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
         max_cost = max_cost.max(price);
     }
     if let Some(log) = &mut log {
-        (collapses, max_cost) = settle(&mut state.mesh, state.cost, log, settings, max_cost);
+        (collapses, max_cost) = settle(&mut state.mesh, state.cost, log, settings);
     }
     state.mesh.finish(collapses, max_cost)
 }

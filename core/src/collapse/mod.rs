@@ -177,8 +177,8 @@ pub struct Collapsed {
     pub remap: Vec<u32>,
     /// Number of edges collapsed.
     pub collapses: usize,
-    /// The highest cost paid or, where it is more, what the cost found at the end ([`Cost::verify`]), never above [`Settings::max_cost`]; in its
-    /// unit; 0 where nothing was collapsed.
+    /// The highest cost paid or, where the cost verifies, the most that it found at the end; never above [`Settings::max_cost`]; in its unit; 0
+    /// where nothing was collapsed.
     pub max_cost: f32,
 }
 

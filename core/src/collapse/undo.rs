@@ -81,14 +81,12 @@ impl Log {
     }
 }
 
-/// Takes collapses back until the cost finds no triangle off by more than `settings` allow. How many are left, and what the whole costs: at least
-/// `dearest`, or nothing where none is left.
+/// Takes collapses back until the cost finds no triangle off by more than `settings` allow. How many are left, and what the whole costs.
 pub(super) fn settle<C: Cost + ?Sized>(
     mesh: &mut LiveMesh,
     cost: &mut C,
     log: &mut Log,
     settings: &Settings,
-    dearest: f32,
 ) -> (usize, f32) {
     loop {
         let off = cost.verify(mesh);
@@ -98,8 +96,8 @@ pub(super) fn settle<C: Cost + ?Sized>(
         let times: BTreeSet<u32> = bad.filter(|&t| t != NONE).collect();
         if times.is_empty() {
             let left = log.of.iter().filter(|&&time| time != NONE).count();
-            let total = living().map(|t| off[t as usize]).fold(dearest, f32::max);
-            return (left, if left > 0 { total } else { 0.0 });
+            let total = living().map(|t| off[t as usize]).fold(0.0, f32::max);
+            return (left, total);
         }
         log.take_back(mesh, times);
     }

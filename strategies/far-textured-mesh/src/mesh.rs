@@ -236,6 +236,14 @@ impl Cost for Constrained<'_> {
         self.inner.collapsed(mesh, from, onto, at);
     }
 
+    fn verifies(&self) -> bool {
+        self.inner.verifies()
+    }
+
+    fn verify(&mut self, mesh: &LiveMesh) -> Vec<f32> {
+        self.inner.verify(mesh)
+    }
+
     fn reach(&self) -> Reach {
         self.inner.reach()
     }

@@ -21,6 +21,9 @@ const ROUNDING: f32 = 1e-4;
 /// What is kept free for what lies between vertices: on scans the bound of the whole was up to 1.5 times what vertices gave, but for a few
 /// triangles in a hundred less than 1.1 times. What turns out to need more is taken back.
 pub(crate) const MARGIN: f32 = 1.1;
+/// Prices are estimates, told apart to such a part of what may be paid: symmetric ones, as those of a vertex onto either end of the edge that
+/// it leaves behind, are equal then, and order decides between them, not rounding.
+const STEPS: f32 = 64.0;
 /// No vertex.
 const NONE: u32 = u32::MAX;
 
@@ -34,6 +37,8 @@ pub(crate) struct Deviation<'a> {
     under: Under,
     /// Vertices that died on a border.
     border: Vec<bool>,
+    /// For each triangle the most that vertices and their looks were ever off on it, scene units; nothing where looks do not count.
+    looked: Vec<f32>,
     patch: Patch,
     measure: Option<Measure<'a>>,
 }
@@ -103,7 +108,8 @@ impl<'a> Deviation<'a> {
     ) -> Self {
         let under = Under { first: vec![NONE; mesh.indices.len() / 3], next: vec![NONE; mesh.positions.len()] };
         let border = vec![false; mesh.positions.len()];
-        Self { px, most, mesh, looks, under, border, patch: Patch::default(), measure: None }
+        let looked = vec![0.0; mesh.indices.len() / 3];
+        Self { px, most, mesh, looks, under, border, looked, patch: Patch::default(), measure: None }
     }
 
     /// The most pixels that a length takes at a place.
@@ -160,7 +166,8 @@ impl<'a> Deviation<'a> {
                 v = self.under.next[v as usize];
             }
         }
-        let cost = most * scale;
+        let step = if self.most < f32::MAX { self.most / STEPS } else { 0.0 };
+        let cost = if step > 0.0 { (most * scale / step).round() * step } else { most * scale };
         if cost.is_finite() { cost } else { f32::INFINITY }
     }
 }
@@ -195,8 +202,8 @@ impl Cost for Deviation<'_> {
             }
         }
         for &(v, was) in &covered {
-            let foot = || patch.foot(mesh, self.mesh.positions, self.looks.as_ref(), v);
-            let over = || foot().map(|(f, _)| patch.moved[f.moved].triangle);
+            let foot = patch.foot(mesh, self.mesh.positions, self.looks.as_ref(), v);
+            let over = || foot.map(|(f, _)| patch.moved[f.moved].triangle);
             let of_border = || {
                 was.filter(|t| !patch.gone.contains(t))
                     .or_else(|| patch.heir(mesh, [from, onto], was, self.mesh.positions[v as usize]))
@@ -204,6 +211,9 @@ impl Cost for Deviation<'_> {
             let own = if self.border[v as usize] { of_border().or_else(over) } else { over() };
             let other = || mesh.triangles_of(onto).iter().copied().find(|t| !patch.gone.contains(t));
             if let Some(t) = own.or_else(other) {
+                if let (Some(_), Some((_, off))) = (&self.looks, foot) {
+                    self.looked[t as usize] = self.looked[t as usize].max(off);
+                }
                 under.next[v as usize] = std::mem::replace(&mut under.first[t as usize], v);
             }
         }
@@ -214,7 +224,7 @@ impl Cost for Deviation<'_> {
         true
     }
 
-    /// A bound of the two-sided distance.
+    /// A bound of the two-sided distance, and what dead vertices look like.
     fn verify(&mut self, mesh: &LiveMesh) -> Vec<f32> {
         let length = |t: u32| mesh.position(mesh.corners(t)[0]).distance(mesh.position(mesh.corners(t)[1]));
         let scale = |t: u32| self.pixels(mesh.position(mesh.corners(t)[0]), length(t)) / length(t);
@@ -224,6 +234,10 @@ impl Cost for Deviation<'_> {
         let fine = if scale > 0.0 { self.most / scale } else { 0.0 };
         let measure = self.measure.get_or_insert_with(|| Measure::new(self.mesh.positions, self.mesh.indices));
         let mut off = measure.off(mesh, fine);
+        let original = |t: u32| [0, 1, 2].map(|k| self.mesh.indices[3 * t as usize + k]);
+        for t in living().filter(|&t| mesh.corners(t) != original(t)) {
+            off[t as usize] = off[t as usize].max(self.looked[t as usize]);
+        }
         for t in living().filter(|&t| off[t as usize] > 0.0).collect::<Vec<_>>() {
             let px = mesh.corners(t).map(|v| self.pixels(mesh.position(v), off[t as usize]));
             off[t as usize] = px.into_iter().fold(0.0, f32::max);
