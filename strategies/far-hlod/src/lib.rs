@@ -22,7 +22,6 @@
 //! * Positions and normals are rounded before they are stored; what that moves counts (`grid_steps`).
 //! * Textures: vertices carry albedo alone. Where a texture shows more, the distance to the nearest corner counts as error, so that original
 //!   chunks, which stand below the leaves, are drawn close by.
-//!
 //! * Points: see the file `points`.
 //!
 //! Limits: seams (vertices with several normals or albedos) stay at every level, so models that consist of hard edges are hardly

@@ -1,7 +1,8 @@
 //! Rounding of positions to a grid before storage; what it moves counts in a node's error.
 //!
-//! All nodes share one grid, a power of two wide, from one origin: a vertex that several nodes draw stays one point whatever their levels, and
-//! rounded positions are exact in 32 bits, since the grid is never finer than the scene's size allows.
+//! A vertex inside a node goes to a grid whose cells are parts of what the node may be off by. One that nodes share goes to the finest grid of the tree,
+//! in all of them: it stays one point whatever their levels. Grids are powers of two wide, from one origin, and never finer than the scene's size
+//! allows, so that rounded positions are exact in 32 bits.
 
 use glam::{DVec3, Vec3};
 

@@ -296,12 +296,16 @@ impl Piece {
         self.count += 1;
     }
 
-    /// What lies behind a plane and what lies before it (Sutherland and Hodgman 1974); what only touches it lies on one side.
+    /// What lies behind a plane and what lies before it (Sutherland and Hodgman 1974); what only touches it lies on one side. All of it lies behind where
+    /// its parts had too many corners.
     fn cut(&self, at: Vec3, normal: Vec3) -> (Self, Self) {
         let (mut behind, mut before) = (Self::NONE, Self::NONE);
         let sides = self.points.map(|p| (p - at).dot(normal));
         let sides = &sides[..self.count];
-        if self.count + 1 >= CORNERS || sides.iter().all(|&s| s <= 0.0) {
+        // Two for a convex polygon; more where rounding bends its sides.
+        let crosses = |s: f32, t: f32| s > 0.0 && t < 0.0 || s < 0.0 && t > 0.0;
+        let crossings = (0..self.count).filter(|&i| crosses(sides[i], sides[(i + 1) % self.count])).count();
+        if self.count + crossings > CORNERS || sides.iter().all(|&s| s <= 0.0) {
             return (*self, before);
         }
         if sides.iter().all(|&s| s >= 0.0) {
@@ -316,7 +320,7 @@ impl Piece {
             if s >= 0.0 {
                 before.push(p);
             }
-            if s > 0.0 && t < 0.0 || s < 0.0 && t > 0.0 {
+            if crosses(s, t) {
                 let on = p + (self.points[next] - p) * (s / (s - t));
                 behind.push(on);
                 before.push(on);
@@ -359,5 +363,24 @@ impl Piece {
 
     fn height(&self) -> f32 {
         self.corners().iter().map(|p| p.z.abs()).fold(0.0, f32::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bent_sides_cut_along_them_stay_within_their_corners() {
+        // Every second corner is off the plane by rounding: each side crosses it.
+        for count in 3..=CORNERS {
+            let mut piece = Piece { count, ..Piece::NONE };
+            for (i, p) in piece.points[..count].iter_mut().enumerate() {
+                *p = Vec3::new(i as f32, if i % 2 == 0 { 1e-7 } else { -1e-7 }, 0.0);
+            }
+            let (behind, before) = piece.cut(Vec3::ZERO, Vec3::Y);
+            let all = |p: &Vec3| behind.corners().contains(p) || before.corners().contains(p);
+            assert!(piece.corners().iter().all(all) && behind.count.max(before.count) <= CORNERS);
+        }
     }
 }
