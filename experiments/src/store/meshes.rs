@@ -170,7 +170,7 @@ fn coded<T>(result: meshopt::Result<T>) -> Result<T, Fault> {
 }
 
 fn packed_mesh(m: &MeshPart) -> Result<Packed, Fault> {
-    let mut indices = meshopt::optimize_vertex_cache(&m.indices, m.positions.len());
+    let mut indices = meshopt::optimize_vertex_cache_strip(&m.indices, m.positions.len());
     // Vertices by their first use.
     let (mut remap, mut order) = (vec![u32::MAX; m.positions.len()], vec![]);
     for i in &mut indices {
