@@ -380,11 +380,12 @@ impl Patch {
                 let (u, w) = (flat.perp_dot(m.b) / area, m.a.perp_dot(flat) / area);
                 if u.min(w).min(1.0 - u - w) >= -ROUNDING {
                     let over = height - (u * m.heights[0] + w * m.heights[1]);
-                    let foot = Foot {
-                        moved: i,
-                        corners: m.corners,
-                        weights: [1.0 - u - w, u, w],
-                        off: over.abs() * m.upright,
+                    // Looks are compared at the nearest place, which on a steep triangle is not the one straight below.
+                    let foot = if looks.is_some() {
+                        self.nearest(mesh, at, i)
+                    } else {
+                        let weights = [1.0 - u - w, u, w];
+                        Foot { moved: i, corners: m.corners, weights, off: over.abs() * m.upright }
                     };
                     let off = off(&foot);
                     if best.is_none_or(|b| off < b.1) {
@@ -394,15 +395,16 @@ impl Patch {
             }
         }
         best.or_else(|| {
-            let mut nearest: Option<Foot> = None;
-            for (i, m) in self.moved.iter().enumerate() {
-                let (point, w) = nearest_on_triangle(at.as_dvec3(), m.corners.map(|c| mesh.position(c).as_dvec3()));
-                let off = point.distance(at.as_dvec3()) as f32;
-                if nearest.is_none_or(|n| off < n.off) {
-                    nearest = Some(Foot { moved: i, corners: m.corners, weights: w.map(|w| w as f32), off });
-                }
-            }
+            let all = (0..self.moved.len()).map(|i| self.nearest(mesh, at, i));
+            let nearest = all.reduce(|a, b| if b.off < a.off { b } else { a });
             nearest.map(|f| (f, off(&f)))
         })
+    }
+
+    /// The place of a moved triangle that is nearest to a point.
+    fn nearest(&self, mesh: &LiveMesh, at: Vec3, moved: usize) -> Foot {
+        let (at, corners) = (at.as_dvec3(), self.moved[moved].corners);
+        let (point, w) = nearest_on_triangle(at, corners.map(|c| mesh.position(c).as_dvec3()));
+        Foot { moved, corners, weights: w.map(|w| w as f32), off: point.distance(at) as f32 }
     }
 }

@@ -20,9 +20,11 @@ const NONE: u32 = u32::MAX;
 /// Parts of the original are cut by so many new triangles at most.
 const CUTS: u32 = 4;
 /// Pieces that may lie anywhere are divided so many times at most.
-const DEPTH: u32 = 14;
+const DEPTH: u32 = 20;
 /// Of what is allowed, a part that is not worth a division.
 const FINE: f32 = 0.25;
+/// Of what is allowed, a part below which the first bound that is found will do: above it nearer triangles are looked for.
+const TIGHT: f32 = 0.75;
 /// How much too far a piece's bound may be.
 const SLACK: f32 = 1.1;
 /// What may be missing of a triangle's area that counts as covered: rounding.
@@ -81,7 +83,7 @@ impl<'a> Measure<'a> {
             }
             let over = self.sheet.covering(mesh.corners(t), positions, original).unwrap_or(f32::INFINITY);
             // A steep sliver sees what is far along its normal.
-            if over > allowed {
+            if over > TIGHT * allowed {
                 self.was.pieces(Piece::new(at(mesh.corners(t))), DEPTH, allowed, &mut |_, d| *far = far.max(d));
             }
             *far = if *far > 0.0 { far.min(over) } else { over };
@@ -104,7 +106,7 @@ impl<'a> Measure<'a> {
                 rest.push(original);
             }
             among(original, CUTS, run, &|t| at(mesh.corners(t)), allowed, &mut |piece, t, d| {
-                if d > allowed { rest.push(piece) } else { self.there.push((o, t, d)) }
+                if d > TIGHT * allowed { rest.push(piece) } else { self.there.push((o, t, d)) }
             });
             for p in rest {
                 is.pieces(p, DEPTH, allowed, &mut |t, d| self.there.push((o, living[t as usize], d)));
@@ -172,7 +174,7 @@ struct Surface<'a> {
 
 impl Surface<'_> {
     /// Bounds a piece by the triangle of this surface that is nearest to its middle; where that is not tight, what lies over or under that
-    /// triangle is cut out, if it is of its size, else it is halved.
+    /// triangle is cut out, if it is of its size and not every time, else it is halved.
     fn pieces(&self, piece: Piece, depth: u32, allowed: f32, out: &mut dyn FnMut(u32, f32)) {
         let tree = self.tree.get_or_init(|| TriangleBvh::build(self.positions, self.indices));
         if piece.count == 0 {
@@ -187,8 +189,9 @@ impl Surface<'_> {
         }
         let (outside, inside) = piece.split(there);
         let over = far(&inside);
-        let small = piece.longest().0 <= 2.0 * Piece::new(there).longest().0;
-        if small && inside.count > 0 && over <= allowed {
+        // Every second time, since cutting alone may go round in slivers.
+        let small = depth.is_multiple_of(2) && piece.longest().0 <= 2.0 * Piece::new(there).longest().0;
+        if small && inside.count > 0 && over <= TIGHT * allowed {
             out(near.triangle, over);
             outside.into_iter().for_each(|p| self.pieces(p, depth - 1, allowed, out));
         } else {

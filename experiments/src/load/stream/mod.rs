@@ -154,11 +154,12 @@ pub fn open(path: &Path, options: &LoadOptions, keep: &Keep<'_>) -> Result<Strea
         let file = file.to_owned();
         move |cause| LoadError::Read { file, cause }
     };
-    let mut parts = vec![VERSION.to_vec()];
+    let mut digests = vec![];
     for f in &files {
-        parts.push(identity::digest(keep.store, f).map_err(failed(f))?.to_vec());
+        digests.push(identity::digest(keep.store, f).map_err(failed(f))?);
     }
-    let name = key("chunks", &parts.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    let parts: Vec<&[u8]> = std::iter::once(VERSION).chain(digests.iter().map(<[u8; 32]>::as_slice)).collect();
+    let name = key("chunks", &parts);
     let home = keep.store.root().join("scenes");
     let home = home.join(name.iter().map(|b| format!("{b:02x}")).collect::<String>() + ".chunks");
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
@@ -170,7 +171,7 @@ pub fn open(path: &Path, options: &LoadOptions, keep: &Keep<'_>) -> Result<Strea
                 (keep.say)(&format!("{e}; it is made anew"));
             }
             (keep.say)(&format!("{} is cut into chunks, kept in {}", path.display(), home.display()));
-            make(&files, folder, &home, keep)?;
+            make(&files, &digests, folder, &home, keep)?;
             ChunkFile::open(&home, keep.memory_bytes).map_err(|e| LoadError::kept(&home, e))?
         }
     };
@@ -217,7 +218,8 @@ struct Read<'a, C> {
     flat: bool,
 }
 
-fn make(files: &[PathBuf], folder: &Path, home: &Path, keep: &Keep<'_>) -> Result<(), LoadError> {
+/// Cuts `files`, whose contents are known by `digests`, into the chunk file `home`.
+fn make(files: &[PathBuf], digests: &[[u8; 32]], folder: &Path, home: &Path, keep: &Keep<'_>) -> Result<(), LoadError> {
     let aside = keep.store.aside();
     let work = Work::new(&aside, keep.memory_bytes, keep.cancel);
     let failed = |e| LoadError::temporary(&aside, e);
@@ -250,6 +252,13 @@ fn make(files: &[PathBuf], folder: &Path, home: &Path, keep: &Keep<'_>) -> Resul
                 append(Read { intake, textures, beside, flat: false }, &mut writer, folder, keep)?;
             }
             None => return Err(LoadError::unsupported(file, "this format", WHOLE)),
+        }
+    }
+    // What was read is what the file's name says.
+    for (file, digest) in files.iter().zip(digests) {
+        let now = identity::digest(keep.store, file).map_err(|cause| LoadError::Read { file: file.clone(), cause })?;
+        if now != *digest {
+            return Err(LoadError::data(file, "contents", "the file changed while it was read"));
         }
     }
     writer.finish(home).map_err(|e| LoadError::temporary(home.parent().unwrap_or(home), e))

@@ -429,6 +429,28 @@ fn files_beside_the_model_count() {
 }
 
 #[test]
+fn a_file_that_changes_while_it_is_cut_is_told_and_not_kept() {
+    let dir = tempfile::tempdir().unwrap();
+    let balls = [20, 21].map(|n| ply(Ply::Little, &ball(n, false), false, false));
+    let path = put(dir.path(), "a.ply", &balls[0]);
+    let store = store(&dir.path().join("store"));
+    // Between the digest and the reading.
+    let change = |said: &str| {
+        if said.contains("is cut into chunks") {
+            put(dir.path(), "a.ply", &balls[1]);
+        }
+    };
+    let keep = Keep { store: &store, memory_bytes: 2 << 20, cancel: &NEVER, say: &change };
+    let e = open(&path, &LoadOptions::default(), &keep).err().unwrap().to_string();
+    assert!(e.contains("a.ply") && e.contains("changed while it was read"), "{e}");
+    assert!(scenes(&store).is_empty() && std::fs::read_dir(store.aside()).unwrap().count() == 0);
+    // The next time it is what it has become.
+    let (scene, _) = streamed(&path, &LoadOptions::default(), &store, 2 << 20).unwrap();
+    assert_eq!(scene.triangles(), check_same(&path, &LoadOptions::default()).triangles());
+    assert!(scene.triangles() > 12 * 20 * 20);
+}
+
+#[test]
 fn interruption_and_bad_input_leave_nothing_behind() {
     let dir = tempfile::tempdir().unwrap();
     let good = ply(Ply::Little, &ball(100, true), false, false);
