@@ -143,7 +143,7 @@ struct Tree<'a> {
     promises: Vec<Promise>,
     payloads: Vec<Payload>,
     pieces: Pieces,
-    /// Rounding moves no position by more.
+    /// Rounding moves no position of the deepest nodes by more.
     grid: f32,
     /// What a node of depth 0 may be off by.
     allowance: f32,
@@ -176,13 +176,19 @@ impl<'a> Tree<'a> {
             let original = gather(self.scene, self.promises[i].chunks.iter().copied(), DVec3::ZERO).unwrap();
             let mut found = self.geometry(i, &original, samples, &mut rng);
             if self.appearance {
-                let looks = Looks::new(&self.payloads[i], self.grid);
+                let looks = Looks::new(&self.payloads[i], self.rounding(i));
                 found.made_of = self.looks_of_sources(i, &looks, samples, &mut rng);
                 found.original = self.looks_of_original(i, &looks, &original, samples, &mut rng);
             }
             found
         };
         (0..self.promises.len()).into_par_iter().map(one).reduce(Found::default, Found::joined)
+    }
+
+    /// Rounding moves no position of a node by more: its grid is as much wider than the deepest nodes' as it stands higher.
+    fn rounding(&self, i: usize) -> f32 {
+        let deepest = self.promises.iter().map(|p| p.depth).max().unwrap_or(0);
+        self.grid * f32::from(deepest - self.promises[i].depth).exp2()
     }
 
     /// A node's children: the nodes after it, up to the next one that is not deeper.
@@ -231,6 +237,7 @@ impl<'a> Tree<'a> {
         let sources: Vec<usize> = self.children(i).into_iter().flat_map(below).collect();
         let before = sources.iter().map(|&s| self.promises[s].error).fold(0.0, f32::max);
         let size = self.allowance * 0.5f32.powi(self.promises[i].depth.into());
+        let rounded = sources.iter().map(|&s| self.rounding(s)).fold(0.0, f32::max);
         let mut vertices: Vec<(Vec3, Vec3, [u8; 4])> = vec![];
         for s in sources {
             for part in &self.payloads[s].parts {
@@ -239,7 +246,7 @@ impl<'a> Tree<'a> {
                 let mut large = vec![false; m.positions.len()];
                 for t in m.indices.chunks_exact(3) {
                     let p = [t[0], t[1], t[2]].map(at);
-                    if [(0, 1), (1, 2), (2, 0)].iter().any(|&(a, b)| p[a].distance(p[b]) >= size + 2.0 * self.grid) {
+                    if [(0, 1), (1, 2), (2, 0)].iter().any(|&(a, b)| p[a].distance(p[b]) >= size + 2.0 * rounded) {
                         t.iter().for_each(|&v| large[v as usize] = true);
                     }
                 }
@@ -249,8 +256,8 @@ impl<'a> Tree<'a> {
         }
         for _ in 0..if vertices.is_empty() { 0 } else { samples } {
             let (at, normal, albedo) = vertices[rng.random_range(0..vertices.len())];
-            // Source and node are both rounded, which the difference of their errors holds once.
-            let promised = self.promises[i].error - before + self.grid;
+            // An error holds the rounding of its node: the sources', which `before` takes off, counts for their vertices, and for what they are off by.
+            let promised = self.promises[i].error - before + 2.0 * rounded;
             out.add(looks.off(at, normal, albedo, promised, 2.0 * ROUNDED), promised);
         }
         out
