@@ -103,6 +103,8 @@ pub(super) fn run<C: Cost + ?Sized>(mesh: LiveMesh, cost: &mut C, settings: &Set
         }
         starved = done * 8 < found || done == 0;
     }
+    // Looking over the whole takes memory of its own.
+    drop((edges, chosen, touched, ends_of_chosen));
     state.finish(settings)
 }
 

@@ -100,16 +100,22 @@ impl<'a> Measure<'a> {
             next += self.pairs[next..].partition_point(|p| p[0] < o);
             let run = &self.pairs[next..next + self.pairs[next..].partition_point(|p| p[0] == o)];
             let original = Piece::new(at(whole(o)));
+            // Of its pieces at one triangle the farthest.
+            let first = self.there.len();
+            let mut keep = |t: u32, d: f32| match self.there[first..].iter_mut().find(|w| w.1 == t) {
+                Some(known) => known.2 = known.2.max(d),
+                None => self.there.push((o, t, d)),
+            };
             // Where it lies over none, or nearer to one that it does not lie over.
             let mut rest = vec![];
             if run.is_empty() {
                 rest.push(original);
             }
             among(original, CUTS, run, &|t| at(mesh.corners(t)), allowed, &mut |piece, t, d| {
-                if d > TIGHT * allowed { rest.push(piece) } else { self.there.push((o, t, d)) }
+                if d > TIGHT * allowed { rest.push(piece) } else { keep(t, d) }
             });
             for p in rest {
-                is.pieces(p, DEPTH, allowed, &mut |t, d| self.there.push((o, living[t as usize], d)));
+                is.pieces(p, DEPTH, allowed, &mut |t, d| keep(living[t as usize], d));
             }
         }
         self.corners = now;
