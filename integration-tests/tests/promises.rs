@@ -413,15 +413,14 @@ fn on_screen(lab: &Lab, views: usize, drawn_for: &dyn Fn(&Camera) -> Camera) -> 
     all
 }
 
-/// Checks a scene with both metrics, `samples` of each kind a node and `views` pictures; how much is beyond what is promised: places and pixels, looks.
-fn check(name: &str, scene: &str, samples: usize, views: usize) -> (u64, Sought) {
-    let (mut beyond, mut looks) = (0, Sought::default());
+/// Checks a scene with both metrics, `samples` of each kind a node and `views` pictures; how much is beyond what is promised: places, looks, pixels.
+fn check(name: &str, scene: &str, samples: usize, views: usize) -> u64 {
+    let mut beyond = 0;
     for metric in ["appearance", "hausdorff"] {
         let lab = lab(scene, &format!("metric = {{ type = \"{metric}\" }}"));
         let found = Tree::new(&lab, &lab.opened(0).unwrap()).check(samples);
         println!("{name}, {metric}, {} triangles: {found:?}", lab.prepared.scene.triangles());
-        beyond += found.beyond as u64;
-        looks = looks.joined(found.made_of);
+        beyond += (found.beyond + found.made_of.beyond) as u64;
         // Looks are compared in the vertices that a node is made of; in between, and so for vertices of the original that are gone two levels
         // below, the promise is an estimate.
         assert!(found.original.beyond * 5000 <= found.original.vertices, "{name}, {metric}: {found:?}");
@@ -430,7 +429,7 @@ fn check(name: &str, scene: &str, samples: usize, views: usize) -> (u64, Sought)
         println!("{name}, {metric}, {views} views: {seen:?}");
         beyond += seen.beyond;
     }
-    (beyond, looks)
+    beyond
 }
 
 /// A generated scene.
@@ -438,8 +437,7 @@ const ASTEROID: &str = "source = \"asteroid\"\ntriangles = 100_000";
 
 #[test]
 fn no_sample_refutes_a_node_or_a_picture_of_a_generated_scene() {
-    let (beyond, looks) = check("asteroid", ASTEROID, 200, 10);
-    assert_eq!((beyond, looks.beyond), (0, 0));
+    assert_eq!(check("asteroid", ASTEROID, 200, 10), 0);
 }
 
 #[test]
@@ -447,8 +445,7 @@ fn no_sample_refutes_a_node_or_a_picture_of_scans() {
     let Some(folder) = models("no_sample_refutes_a_node_or_a_picture_of_scans") else { return };
     let dragon = "statuary/dragon_vrip_res2.ply.gz";
     for (name, path) in [("armadillo", "scans/armadillo.obj.gz"), ("igea", "scans/igea.ply.gz"), ("dragon", dragon)] {
-        let (beyond, looks) = check(name, &file(&folder, path), 200, 10);
-        assert_eq!((beyond, looks.beyond), (0, 0), "{name}");
+        assert_eq!(check(name, &file(&folder, path), 200, 10), 0, "{name}");
     }
 }
 
@@ -458,18 +455,15 @@ fn no_sample_refutes_a_node_or_a_picture_of_scans() {
 /// FARFIELD_MODELS=... cargo test -p farfield-integration-tests --test promises -- --ignored --nocapture
 /// ```
 #[test]
-#[ignore = "minutes; run it by name"]
+#[ignore = "some five minutes: run it by name"]
 fn no_sample_refutes_a_node_or_any_of_500_pictures() {
     let Some(folder) = models("no_sample_refutes_a_node_or_any_of_500_pictures") else { return };
-    let (mut beyond, mut looks) = check("asteroid", "source = \"asteroid\"\ntriangles = 1_000_000", 1000, 125);
+    let mut beyond = check("asteroid", "source = \"asteroid\"\ntriangles = 1_000_000", 1000, 125);
     let dragon = "scans/dragon_vrip.ply.gz";
     for (name, path) in [("armadillo", "scans/armadillo.obj.gz"), ("igea", "scans/igea.ply.gz"), ("dragon", dragon)] {
-        let found = check(name, &file(&folder, path), 1000, 125);
-        (beyond, looks) = (beyond + found.0, looks.joined(found.1));
+        beyond += check(name, &file(&folder, path), 1000, 125);
     }
-    println!("beyond: {beyond} places and pixels, looks {looks:?}");
-    // A few looks in a hundred thousand are: the book tells.
-    assert!(beyond == 0 && looks.beyond * 20_000 <= looks.vertices, "{looks:?}");
+    assert_eq!(beyond, 0);
 }
 
 #[test]

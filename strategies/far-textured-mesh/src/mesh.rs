@@ -119,9 +119,11 @@ pub(crate) fn simplify(
     let (steps, weights) = (own.steps(job.views.near), own.weights());
     let looks: Vec<_> = views.iter().map(|v| look(&mesh, v, &steps, &weights, own.visible_px)).collect();
     let seen = combine(&mesh, &looks, own.weigh == Weigh::AllViews);
-    let (out, border_move) = reduce(own, &mesh, &keep, &seen, &eyes, !verdict.passes)?;
-
     let stretch = f64::from(job.views.half_diagonal_rad()).cos().powi(-2);
+    // What bounds a distance bounds it in a picture's corners too, where lengths are longest.
+    let most_px = if own.collapse.bounds_distance() { own.edge_px / stretch as f32 } else { own.edge_px };
+    let (out, border_move) = reduce(own, &mesh, &keep, &seen, &eyes, (!verdict.passes, most_px))?;
+
     let erosion_px = f64::from(border_move) / f64::from(distance) * stretch * f64::from(px_per_tan);
     let size_px = views[0].camera.size.map(|n| n as f32);
     let mut baked = assemble(own, &mesh, &out, &seen, views);
@@ -259,7 +261,7 @@ fn reduce(
     keep: &[bool],
     seen: &[VertexSeen],
     eyes: &Eyes,
-    several_views: bool,
+    (several_views, most_px): (bool, f32),
 ) -> Result<(Collapsed, f32), Fault> {
     let indices: Vec<u32> = mesh.triangles.iter().zip(keep).filter(|(_, k)| **k).flat_map(|(t, _)| *t).collect();
     let originals: Vec<u32> = (0..keep.len() as u32).filter(|&i| keep[i as usize]).collect();
@@ -267,7 +269,7 @@ fn reduce(
     let live = LiveMesh::new(&mesh.positions, &indices, &locked)?;
     let view = MeshView { positions: &mesh.positions, normals: &mesh.normals, albedo: &[], indices: &indices };
     let px = |a: Vec3, b: Vec3| eyes.length_px(a, b);
-    let (inner, max_cost) = own.collapse.begin(view, seen, &px, own.edge_px)?;
+    let (inner, max_cost) = own.collapse.begin(view, seen, &px, most_px)?;
     let mut cost = Constrained { inner, seen, several_views };
     let settings = Settings {
         max_cost,
