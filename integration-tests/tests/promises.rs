@@ -258,7 +258,7 @@ impl<'a> Tree<'a> {
             let (at, normal, albedo) = vertices[rng.random_range(0..vertices.len())];
             // An error holds the rounding of its node: the sources', which `before` takes off, counts for their vertices, and for what they are off by.
             let promised = self.promises[i].error - before + 2.0 * rounded;
-            out.add(looks.off(at, normal, albedo, promised, 2.0 * ROUNDED), promised);
+            out.add(looks.off(at, normal, albedo, promised, Rounded { turn: 2.0 * ROUNDED, place: rounded }), promised);
         }
         out
     }
@@ -277,7 +277,7 @@ impl<'a> Tree<'a> {
             let w = &original.wedges[rng.random_range(0..original.wedges.len())];
             let at = original.positions[w.vertex as usize];
             let e = self.promises[i].error;
-            out.add(looks.off(at, w.normal, w.albedo, e, ROUNDED), e);
+            out.add(looks.off(at, w.normal, w.albedo, e, Rounded { turn: ROUNDED, place: 0.0 }), e);
         }
         out
     }
@@ -305,6 +305,13 @@ const STEPS: usize = 32;
 /// Place, normal and albedo of a triangle's corners.
 type Corners = [(Vec3, Vec3, Vec3); 3];
 
+/// What rounding may have done to a vertex that is sought: its normal turned, with the one that it is compared with, and its place moved.
+#[derive(Clone, Copy)]
+struct Rounded {
+    turn: f32,
+    place: f32,
+}
+
 /// What a node looks like.
 struct Looks {
     triangles: Vec<Corners>,
@@ -326,9 +333,8 @@ impl Looks {
     }
 
     /// The least error of the formula over places of triangles within `promised`: first at each triangle's nearest place; where that is too
-    /// far, at others too. What rounding may have made of normals and places is taken off: `rounded` is what a normal and the one that
-    /// it is compared with are turned by together.
-    fn off(&self, at: Vec3, normal: Vec3, albedo: [u8; 4], promised: f32, rounded: f32) -> f32 {
+    /// far, at others too. What rounding may have made of normals and places is taken off.
+    fn off(&self, at: Vec3, normal: Vec3, albedo: [u8; 4], promised: f32, rounded: Rounded) -> f32 {
         let mut least = f32::INFINITY;
         let near = |visit: &mut dyn FnMut(&Corners)| {
             self.boxes.around(at, promised, |i, _| visit(&self.triangles[i as usize]));
@@ -349,25 +355,23 @@ impl Looks {
     }
 
     /// The error of the formula at a place of a triangle.
-    fn off_at(&self, t: &Corners, w: [f32; 3], (at, normal, albedo): (Vec3, Vec3, Vec3), rounded: f32) -> f32 {
+    fn off_at(&self, t: &Corners, w: [f32; 3], (at, normal, albedo): (Vec3, Vec3, Vec3), rounded: Rounded) -> f32 {
         let mix = |v: [Vec3; 3]| v[0] * w[0] + v[1] * w[1] + v[2] * w[2];
         let (p, n, c) = (t.map(|c| c.0), t.map(|c| c.1), t.map(|c| c.2));
-        let turned = angle(normal, mix(n).normalize_or_zero()) - rounded;
+        let turned = angle(normal, mix(n).normalize_or_zero()) - rounded.turn;
         let other = (albedo - mix(c)).abs().max_element();
         let length = |i: usize, j: usize| (p[i].distance(p[j]) - 2.0 * self.grid).max(0.0);
-        let by_normal = away(turned, |i, j| angle(n[i], n[j]) + 2.0 * ROUNDED, length);
-        let by_albedo = away(other, |i, j| (c[i] - c[j]).abs().max_element(), length);
+        let moved = self.grid + rounded.place;
+        let by_normal = away(turned, moved, |i, j| angle(n[i], n[j]) + 2.0 * ROUNDED, length);
+        let by_albedo = away(other, moved, |i, j| (c[i] - c[j]).abs().max_element(), length);
         at.distance(mix(p)).hypot(by_normal.max(by_albedo))
     }
 }
 
-/// A difference over how fast it varies along a triangle's edges.
-fn away(difference: f32, along: impl Fn(usize, usize) -> f32, length: impl Fn(usize, usize) -> f32) -> f32 {
-    if difference <= LEAST {
-        return 0.0;
-    }
+/// A difference over how fast it varies along a triangle's edges; none where it is none at a place that is `moved` as far.
+fn away(difference: f32, moved: f32, along: impl Fn(usize, usize) -> f32, length: impl Fn(usize, usize) -> f32) -> f32 {
     let steepest = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| along(i, j) / length(i, j)).into_iter().fold(0.0, f32::max);
-    difference / steepest
+    if difference - steepest * moved <= LEAST { 0.0 } else { difference / steepest }
 }
 
 fn angle(a: Vec3, b: Vec3) -> f32 {
