@@ -10,11 +10,17 @@
 //!             way to its cell / speed )                  blocks of other cells: until the viewer is there
 //! ```
 //!
-//! in seconds. The rates are settings, or the largest that the walk has shown so far; while there are none, the turn decides, then the way.
-//! Of several frusta that want a block (the eye's, the lights') the one that needs it first counts.
+//! in seconds, and the priority of a block
 //!
-//! * First comes what is in view, by the error without it, then the rest by time. A block comes after the one that it is useless without,
-//!   and neither without the other.
+//! ```text
+//! priority = e 2^(-time / HALF_S)            what is in view: e
+//! ```
+//!
+//! so that what would be off by far, were it seen in a moment, comes before what is seen and off by little: where the budget is too small for
+//! all that is in view, a turn does not uncover what is hardly there. The rates are settings, or the largest that the walk has shown so far;
+//! while there are none, the turn decides, then the way. Of several frusta that want a block (the eye's, the lights') the one that needs it first counts.
+//!
+//! * A block comes after the one that it is useless without, and neither without the other.
 //! * Nothing is evicted but for room, and then what is needed last, or is no longer asked for at all.
 //! * *Hysteresis*: what is there is only pushed out by what is more urgent by the factor [`MARGIN`], and what was in view counts as in view
 //!   for [`LINGER_S`] longer. So on a border nothing goes back and forth, and where the budget is too small for what is in view, the same set
@@ -34,6 +40,9 @@ use crate::movement::{turn_rad, way};
 
 /// How much more urgent a block has to be than one that it pushes out.
 const MARGIN: f64 = 1.25;
+/// In so much time until it matters a block's priority halves, seconds. On walks along a model too large for its budget 0.1 to 1 made no
+/// difference.
+const HALF_S: f64 = 0.5;
 /// How long a block counts as in view after it was, seconds: longer than a jitter of the head.
 const LINGER_S: f64 = 0.5;
 
@@ -86,13 +95,13 @@ struct Rates {
     turn_rad: f64,
 }
 
-/// How soon a block matters; less is sooner.
+/// How soon a block matters, and how much; less is sooner.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 struct Urgency {
+    /// 1 / priority, 1/px.
+    main: f64,
     /// 0: in view; 1: not.
     rank: u8,
-    /// In view: 1 / the error without it, 1/px; else the time until it matters, seconds.
-    main: f64,
     /// Radians, then scene units: where nothing is known of rates.
     movement: (f64, f64),
 }
@@ -101,7 +110,7 @@ impl Urgency {
     /// For what is not there and might push something out.
     fn delayed(self) -> Self {
         let (turn, way) = self.movement;
-        Self { rank: self.rank, main: self.main * MARGIN, movement: (turn * MARGIN, way * MARGIN) }
+        Self { main: self.main * MARGIN, rank: self.rank, movement: (turn * MARGIN, way * MARGIN) }
     }
 }
 
@@ -185,9 +194,10 @@ impl Movement {
 
     /// See the module.
     fn urgency(&self, c: &Candidate, seen: bool, view: &Camera, way_there: f64, rates: Rates) -> Urgency {
-        let error_px = f64::from(c.error_px_without).max(0.0);
+        // Finite, so that of two infinite ones the movement decides.
+        let error_px = f64::from(c.error_px_without).clamp(0.0, f32::MAX.into());
         if seen {
-            return Urgency { rank: 0, main: 1.0 / error_px, movement: (0.0, 0.0) };
+            return Urgency { main: 1.0 / error_px, rank: 0, movement: (0.0, 0.0) };
         }
         let (turn, go) = (turn_rad(view, &c.bounds), way(view, &c.bounds));
         let distance = f64::from(c.bounds.distance(view.eye.as_vec3()));
@@ -195,8 +205,9 @@ impl Movement {
         let near = if share < 1.0 { distance * (1.0 - share) } else { 0.0 };
         let time = |movement: f64, rate: f64| if movement > 0.0 { movement / rate } else { 0.0 };
         let shown = time(turn, rates.turn_rad).min(time(go, rates.speed));
-        let main = shown.max(time(near, rates.speed)).max(time(way_there, rates.speed));
-        Urgency { rank: 1, main, movement: (turn, go.min(near.max(way_there))) }
+        let time_s = shown.max(time(near, rates.speed)).max(time(way_there, rates.speed));
+        let main = (time_s / HALF_S).exp2() / error_px;
+        Urgency { main, rank: 1, movement: (turn, go.min(near.max(way_there))) }
     }
 
     /// As much of what is wanted as fits, most urgent first, each after what it needs.
@@ -273,9 +284,9 @@ impl Movement {
 
 impl Urgency {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        let Self { rank, main, movement: (turn, way) } = *self;
-        rank.cmp(&other.rank)
-            .then(main.total_cmp(&other.main))
+        let Self { main, rank, movement: (turn, way) } = *self;
+        main.total_cmp(&other.main)
+            .then(rank.cmp(&other.rank))
             .then(turn.total_cmp(&other.movement.0))
             .then(way.total_cmp(&other.movement.1))
     }
