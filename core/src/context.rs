@@ -2,8 +2,13 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::id::LocalPayload;
 use crate::image::SurfaceImage;
 use crate::scene::ChunkSet;
+use crate::strategy::Sink;
 use crate::{Camera, Fault};
 
 /// Handed to every stage. The core has no clock, no files and no threads of its own.
@@ -91,20 +96,45 @@ pub fn collect<T: Send>(
         .ok_or_else(|| Fault::Refused("the executor left out a job".into()))
 }
 
-/// A memory of intermediate results, by content.
+/// What a bake that was interrupted knew already. Only the same bake, begun again, is told.
 pub trait Memo: Sync {
-    /// What was remembered under `key`, or what `make` makes, remembered from now on.
-    ///
-    /// # Errors
-    /// What `make` gives, or what the storage behind it gives.
-    fn get_or(&self, key: &[u8; 32], make: &mut dyn FnMut() -> Result<Vec<u8>, Fault>) -> Result<Vec<u8>, Fault>;
+    /// What was remembered under `key`, whole.
+    fn get(&self, key: &[u8]) -> Option<Vec<u8>>;
+
+    /// Remembers `bytes`; it may forget.
+    fn put(&self, key: &[u8], bytes: &[u8]);
 }
 
 /// Remembers nothing.
 pub struct Forget;
 
 impl Memo for Forget {
-    fn get_or(&self, _key: &[u8; 32], make: &mut dyn FnMut() -> Result<Vec<u8>, Fault>) -> Result<Vec<u8>, Fault> {
-        make()
+    fn get(&self, _key: &[u8]) -> Option<Vec<u8>> {
+        None
     }
+
+    fn put(&self, _key: &[u8], _bytes: &[u8]) {}
+}
+
+/// A piece of a bake that is not made again when the bake is interrupted: `make` makes it and puts its payloads, those that `payloads` names
+/// (ascending); what it makes is remembered under `key`, and taken from there once all these payloads are whole. Claims are not remembered.
+///
+/// # Errors
+/// What `make` and the sink give.
+pub fn remembered<T: Serialize + DeserializeOwned>(
+    key: &[u8],
+    payloads: &dyn Fn(&T) -> Vec<LocalPayload>,
+    make: &mut dyn FnMut() -> Result<T, Fault>,
+    out: &dyn Sink,
+    cx: &Context<'_>,
+) -> Result<T, Fault> {
+    if let Some(known) = cx.memo.get(key).and_then(|bytes| postcard::from_bytes(&bytes).ok())
+        && out.kept(&payloads(&known))?
+    {
+        return Ok(known);
+    }
+    let made = make()?;
+    let bytes = postcard::to_allocvec(&made).map_err(|e| Fault::Refused(format!("what cannot be remembered: {e}")))?;
+    cx.memo.put(key, &bytes);
+    Ok(made)
 }

@@ -123,6 +123,14 @@ pub trait Sink: Sync {
     /// What the storage behind it gives.
     fn put(&self, id: LocalPayload, payload: &Payload) -> Result<(), Fault>;
 
+    /// Whether all of these payloads are there, whole, from the same bake before it was interrupted; they then count as put. By default never.
+    ///
+    /// # Errors
+    /// What the storage behind it gives.
+    fn kept(&self, _ids: &[LocalPayload]) -> Result<bool, Fault> {
+        Ok(false)
+    }
+
     /// States a bound.
     fn claim(&self, claim: Claim);
 

@@ -9,6 +9,7 @@
 //! process's own, the scene and all runs in it. Nothing else should run meanwhile.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use farfield_experiments::build::peak_rss_bytes;
@@ -57,7 +58,7 @@ fn experiment(a: &Args) -> String {
 /// Seconds and cells of one build into an empty store.
 fn once(experiment: &config::Experiment, prepared: &Prepared, threads: usize) -> Result<(f64, usize), String> {
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
-    let store = Store::open(folder.path(), Box::new(|m| eprintln!("{m}"))).map_err(|e| e.to_string())?;
+    let store = Store::open(folder.path(), Arc::new(|m| eprintln!("{m}"))).map_err(|e| e.to_string())?;
     let options = options(folder.path());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| e.to_string())?;
     let built = pool.install(|| build_pipelines(experiment, prepared, &[0], &store, &options));

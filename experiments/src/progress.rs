@@ -7,8 +7,14 @@ pub struct Progress {
     quiet: bool,
 }
 
-/// One bar.
+/// One bar; the default is not drawn.
 pub struct Bar(ProgressBar);
+
+impl Default for Bar {
+    fn default() -> Self {
+        Self(ProgressBar::hidden())
+    }
+}
 
 impl Progress {
     /// On standard error if it is a terminal, unless `quiet`.
@@ -19,6 +25,17 @@ impl Progress {
     /// A bar over a pipeline's cells.
     pub fn cells(&self, pipeline: &str, n: usize) -> Bar {
         self.bar(format!("building {pipeline}"), "cells", n)
+    }
+
+    /// What a pipeline's scene-wide bake has stored; how much there will be is not known.
+    pub fn scene(&self, pipeline: &str) -> Bar {
+        if self.quiet {
+            return Bar::default();
+        }
+        let bar = ProgressBar::no_length().with_message(format!("building {pipeline}, whole scene"));
+        let style = ProgressStyle::with_template("{msg:40!} {pos} payloads stored, {elapsed}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Bar(bar)
     }
 
     /// A bar over a pipeline's frames.

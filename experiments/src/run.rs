@@ -106,7 +106,7 @@ pub fn prepare(experiment: &Experiment, options: &Options<'_>) -> Result<Prepare
 pub(crate) fn open_store(options: &Options<'_>) -> Result<Store, Failure> {
     let failed = |e| Failure::work(format!("the store {} cannot be used", options.store.display()), e);
     // The messages outlive this call's borrow, so they go to standard error themselves.
-    Store::open(&options.store, Box::new(|message| eprintln!("{message}"))).map_err(failed)
+    Store::open(&options.store, Arc::new(|message| eprintln!("{message}"))).map_err(failed)
 }
 
 /// The captures that the pipelines need, if any does.

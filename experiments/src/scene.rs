@@ -1,6 +1,7 @@
 //! From `[scene]` and `[light]` to a scene and its shading.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use farfield_core::draw::Shading;
 use farfield_core::id::MaterialId;
@@ -98,7 +99,7 @@ fn streamed(
     // Commands that keep nothing get a store for as long as they last.
     let own = options.store.as_os_str().is_empty().then(tempfile::tempdir).transpose().map_err(failed)?;
     let folder = own.as_ref().map_or(options.store.as_path(), |d| d.path());
-    let store = Store::open(folder, Box::new(|message| eprintln!("{message}"))).map_err(failed)?;
+    let store = Store::open(folder, Arc::new(|message| eprintln!("{message}"))).map_err(failed)?;
     let keep = Keep { store: &store, memory_bytes: s.memory_bytes, cancel: options.cancel, say: options.say };
     let mut made = stream::open(path, how, &keep).map_err(|e| match e {
         LoadError::Cancelled => Failure::Cancelled,

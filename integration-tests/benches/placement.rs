@@ -19,6 +19,7 @@
 //!   a point (the most that the paper saw on average) 4 (N_0 + 14 K 33.5 / f), N_0 the points of the coarsest grid.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -106,7 +107,7 @@ fn one(triangles: u64, budget: u64, bake: usize) -> Result<Row, Error> {
             (0..bake.min(with.len())).map(|i| with[i * with.len() / bake.min(with.len())].outline.id).collect();
         let of_chosen: usize = chosen.iter().map(|c| insides[c.index()].sectors.len()).sum();
         prepared.divisions[0].needed = chosen;
-        let store = Store::open(folder.path(), Box::new(|m| eprintln!("{m}")))?;
+        let store = Store::open(folder.path(), Arc::new(|m| eprintln!("{m}")))?;
         let start = Instant::now();
         let built = build_pipelines(&experiment, &prepared, &[0], &store, &options(folder.path()))
             .map_err(|f| format!("{f:?}"))?;

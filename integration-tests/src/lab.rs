@@ -1,6 +1,7 @@
 //! Experiments inside tests: from an experiment's text to built pipelines, pictures and counts, through the harness's own steps.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use farfield_core::id::{Block, CellId};
@@ -56,7 +57,7 @@ impl Lab {
         let own = tempfile::tempdir().map_err(|e| e.to_string())?;
         let options = options(own.path());
         let prepared = run::prepare(&experiment, &options).map_err(|f| told(&f))?;
-        let store = Store::open(own.path(), Box::new(|m| eprintln!("{m}"))).map_err(|e| e.to_string())?;
+        let store = Store::open(own.path(), Arc::new(|m| eprintln!("{m}"))).map_err(|e| e.to_string())?;
         Ok(Self { experiment, prepared, store, _folder: own })
     }
 

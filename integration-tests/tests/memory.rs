@@ -8,6 +8,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use farfield_core::Fault;
@@ -481,7 +482,7 @@ fn a_cell_that_was_built_on_demand_is_built_again_when_its_payloads_are_damaged(
                     far_field = { type = \"geometry\" }\n[reference]\npipeline = \"all geometry\"\n";
     let lab = Lab::new(&stones::experiment([96, 72], pipeline), folder.path()).unwrap();
     let (e, p) = (&lab.experiment, &lab.prepared);
-    let store = Store::open(lab.store(), Box::new(|_| ())).unwrap();
+    let store = Store::open(lab.store(), Arc::new(|_| ())).unwrap();
     let (capture, progress, never) =
         (capture(BackendName::Cpu, &p.scene).unwrap(), Progress::new(true), AtomicBool::new(false));
     let site = p.site(&store, &*capture, &never, &progress);

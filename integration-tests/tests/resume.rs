@@ -25,6 +25,9 @@ far_field = { type = "textured-lod-mesh", edge_px = 1.0 }
 name = "several views"
 partition = { type = "hex-cells", edge = 3.0 }
 far_field = { type = "textured-lod-mesh", edge_px = 1.0, view_test = { type = "self-occlusion", max_px = 0.0 } }
+[[pipeline]]
+name = "levels of the whole scene"
+far_field = { type = "point-polygon-hlod", node_triangles = 200, resolution = 64.0 }
 "#;
 
 const STORE: &str = "FARFIELD_TEST_BUILDS_INTO";

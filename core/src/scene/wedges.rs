@@ -7,6 +7,7 @@
 use std::collections::HashMap;
 
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 
 use super::{Material, Scene, Texture, normal_matrix, vertex_albedo, vertex_tint};
 use crate::Fault;
@@ -16,7 +17,7 @@ use crate::mesh::ChunkMesh;
 use crate::payload::MeshPart;
 
 /// A vertex as one side of a seam sees it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wedge {
     /// Index of the welded position.
     pub vertex: u32,
@@ -27,7 +28,7 @@ pub struct Wedge {
 }
 
 /// A triangle whose inside looks otherwise than its corners: it wears a texture.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Textured {
     /// Index of the triangle.
     pub triangle: u32,
@@ -40,7 +41,7 @@ pub struct Textured {
 }
 
 /// Placed chunks in one piece. Triangles are counter-clockwise seen from in front as they are placed.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Gathered {
     /// Where positions start from, local frame.
     pub origin: DVec3,

@@ -26,7 +26,7 @@ pub use executor::{NoCapture, Pool, capture};
 
 use crate::config::{BuildWhen, Pipeline};
 use crate::failure::Failure;
-use crate::progress::Progress;
+use crate::progress::{Bar, Progress};
 use crate::results::Preprocess;
 use crate::store::{Key, Manifest, Recorder, Store, StoreMemo, decode, encode, key};
 
@@ -69,7 +69,7 @@ pub struct Built {
 }
 
 impl Site<'_> {
-    fn context<'b>(&'b self, memo: &'b StoreMemo<'b>) -> Context<'b> {
+    fn context<'b>(&'b self, memo: &'b StoreMemo) -> Context<'b> {
         Context { capture: self.capture, run: &Pool, memo, cancel: self.cancel }
     }
 
@@ -78,16 +78,10 @@ impl Site<'_> {
     /// # Errors
     /// What the partition gives.
     pub fn inside_of(&self, pipeline: &Pipeline, division: &Division, id: CellId) -> Result<(BuiltCell, Needs), Fault> {
-        let memo = self.memo();
-        let (_, cell) = self.inside(pipeline, division, id, &self.context(&memo))?;
+        let (_, cell) = self.inside(pipeline, division, id)?;
         let needs = pipeline.far_field.needs(self.scene, Some(&cell))?;
         let manifest = (!needs.cell_asset).then(Manifest::default);
         Ok((BuiltCell { cell, manifest }, needs))
-    }
-
-    fn memo(&self) -> StoreMemo<'_> {
-        let inputs = key("memory", &[&self.scene.digest, self.capture.identity().as_bytes()]);
-        StoreMemo { store: self.store, inputs }
     }
 
     /// The parts of a key that every block of a pipeline has.
@@ -170,17 +164,33 @@ impl Site<'_> {
         let needs = pipeline.far_field.needs(self.scene, None)?;
         let identity = if needs.captures { self.capture.identity() } else { "" };
         let asset = key("scene asset", &[&base, identity.as_bytes()]);
-        if let Some(known) = self.whole(&asset) {
-            return Ok((asset, known, false));
-        }
-        let sink = Recorder::new(self.store, asset);
-        let memo = self.memo();
-        let index = pipeline.far_field.bake_scene(
-            &SceneJob { scene: self.scene, views: self.views },
-            &sink,
-            &self.context(&memo),
+        let bar = self.progress.scene(&pipeline.name);
+        let job = SceneJob { scene: self.scene, views: self.views };
+        let made = self.asset(&asset, &bar, &|sink, cx| pipeline.far_field.bake_scene(&job, sink, cx));
+        bar.done();
+        made.map(|(manifest, new)| (asset, manifest, new))
+    }
+
+    /// What a bake leaves: from the store, or made, and whether it was made just now.
+    fn asset(
+        &self,
+        asset: &Key,
+        bar: &Bar,
+        bake: &dyn Fn(&Recorder<'_>, &Context<'_>) -> Result<Vec<u8>, Fault>,
+    ) -> Result<(Manifest, bool), Fault> {
+        let memo = StoreMemo::of(self.store, asset);
+        let known = self.whole(asset);
+        let new = known.is_none();
+        let made = known.map_or_else(
+            || {
+                let sink = Recorder::new(self.store, *asset, bar);
+                let index = bake(&sink, &self.context(&memo))?;
+                sink.finish(index)
+            },
+            Ok,
         )?;
-        Ok((asset, sink.finish(index)?, true))
+        memo.clear();
+        Ok((made, new))
     }
 
     /// One cell, with what it needs, and whether it was built just now.
@@ -194,10 +204,7 @@ impl Site<'_> {
         id: CellId,
         shared: Option<(Key, &Manifest)>,
     ) -> Result<(CellId, BuiltCell, Needs, bool), Fault> {
-        let memo = self.memo();
-        let cx = self.context(&memo);
-        cx.check()?;
-        let (inside, cell) = self.inside(pipeline, division, id, &cx)?;
+        let (inside, cell) = self.inside(pipeline, division, id)?;
         let needs = pipeline.far_field.needs(self.scene, Some(&cell))?;
         if !needs.cell_asset {
             return Ok((id, BuiltCell { cell, manifest: Some(Manifest::default()) }, needs, false));
@@ -207,10 +214,6 @@ impl Site<'_> {
         let outlines = if needs.neighbour_cells { encode(&division.cells.outlines())? } else { vec![] };
         let shared_key = shared.map_or([0; 32], |s| s.0);
         let asset = key("cell asset", &[&base, &inside, identity.as_bytes(), &outlines, &shared_key]);
-        if let Some(manifest) = self.whole(&asset) {
-            return Ok((id, BuiltCell { cell, manifest: Some(manifest) }, needs, false));
-        }
-        let sink = Recorder::new(self.store, asset);
         let job = CellJob {
             scene: self.scene,
             views: self.views,
@@ -218,29 +221,27 @@ impl Site<'_> {
             outlines: division.cells.outlines(),
             shared: shared.map(|s| s.1.index.as_slice()),
         };
-        let index = pipeline.far_field.bake_cell(&job, &sink, &cx)?;
-        let manifest = sink.finish(index)?;
-        Ok((id, BuiltCell { cell, manifest: Some(manifest) }, needs, true))
+        let bar = Bar::default();
+        let (manifest, new) = self.asset(&asset, &bar, &|sink, cx| pipeline.far_field.bake_cell(&job, sink, cx))?;
+        Ok((id, BuiltCell { cell, manifest: Some(manifest) }, needs, new))
     }
 
     /// A cell's inside, from the store or made, and the hash of its bytes.
-    fn inside(
-        &self,
-        pipeline: &Pipeline,
-        division: &Division,
-        id: CellId,
-        cx: &Context<'_>,
-    ) -> Result<(Key, Cell), Fault> {
+    fn inside(&self, pipeline: &Pipeline, division: &Division, id: CellId) -> Result<(Key, Cell), Fault> {
         let base = self.base("cell", &pipeline.resolved["partition"], pipeline.partition.version())?;
         let name = key("cell", &[&base, &id.0.to_le_bytes()]);
+        let memo = StoreMemo::of(self.store, &name);
+        let cx = self.context(&memo);
+        cx.check()?;
         if let Some(bytes) = self.store.get(&name)
             && let Ok(cell) = decode(&bytes)
         {
             return Ok((key("inside", &[&bytes]), cell));
         }
-        let cell = division.cells.inside(id, self.scene, cx)?;
+        let cell = division.cells.inside(id, self.scene, &cx)?;
         let bytes = encode(&cell)?;
         self.store.put(&name, &bytes).map_err(|e| Fault::Data { place: "store".into(), cause: e.to_string() })?;
+        memo.clear();
         Ok((key("inside", &[&bytes]), cell))
     }
 }

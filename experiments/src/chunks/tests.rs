@@ -260,7 +260,7 @@ fn the_least_recently_used_goes_first_and_who_holds_does_not_wait() {
 #[test]
 fn contents_are_known_by_their_file_until_it_changes() {
     let dir = tempfile::tempdir().unwrap();
-    let store = Store::open(&dir.path().join("store"), Box::new(|m| panic!("{m}"))).unwrap();
+    let store = Store::open(&dir.path().join("store"), Arc::new(|m| panic!("{m}"))).unwrap();
     let file = dir.path().join("a");
     std::fs::write(&file, b"one").unwrap();
     let is = |bytes: &[u8]| assert_eq!(identity::digest(&store, &file).unwrap(), *blake3::hash(bytes).as_bytes());

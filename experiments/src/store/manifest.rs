@@ -12,7 +12,8 @@ use farfield_core::strategy::{LeftOut, Sink};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::{Key, Store, key, pack};
+use super::{Key, Store, key, pack, unpack};
+use crate::progress::Bar;
 
 /// One payload's block.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,6 +30,13 @@ pub struct Stored {
     pub triangles: u64,
     /// Bytes of its texels.
     pub texture_bytes: u64,
+}
+
+impl Stored {
+    fn of(key: Key, bytes: u64, raw_bytes: u64, payload: &Payload) -> Self {
+        let (triangles, texture_bytes) = (payload.triangles(), payload.texture_bytes());
+        Self { key, bytes, raw_bytes, extent: Extent::of_payload(payload), triangles, texture_bytes }
+    }
 }
 
 /// A finished bake.
@@ -60,13 +68,27 @@ impl Manifest {
 pub struct Recorder<'a> {
     store: &'a Store,
     asset: Key,
+    bar: &'a Bar,
     made: Mutex<Manifest>,
 }
 
 impl<'a> Recorder<'a> {
-    /// For the bake with this key.
-    pub fn new(store: &'a Store, asset: Key) -> Self {
-        Self { store, asset, made: Mutex::default() }
+    /// For the bake with this key. The bar counts payloads.
+    pub fn new(store: &'a Store, asset: Key, bar: &'a Bar) -> Self {
+        Self { store, asset, bar, made: Mutex::default() }
+    }
+
+    fn key(&self, id: LocalPayload) -> Key {
+        key("payload", &[&self.asset, &id.0.to_le_bytes()])
+    }
+
+    fn note(&self, id: LocalPayload, stored: Stored) -> Result<(), Fault> {
+        self.bar.inc();
+        let mut m = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        match m.payloads.insert(id, stored) {
+            None => Ok(()),
+            Some(_) => Err(Fault::Refused(format!("a bake wrote payload {} twice", id.0))),
+        }
     }
 
     /// The manifest, stored; claims and what was left out are put in order, since bakes state them from many threads.
@@ -86,17 +108,19 @@ impl<'a> Recorder<'a> {
 
 impl Sink for Recorder<'_> {
     fn put(&self, id: LocalPayload, payload: &Payload) -> Result<(), Fault> {
-        let key = key("payload", &[&self.asset, &id.0.to_le_bytes()]);
-        let raw = pack(payload)?;
+        let (key, raw) = (self.key(id), pack(payload)?);
         let bytes = self.store.put(&key, &raw).map_err(|e| stored(&e))?;
-        let (triangles, texture_bytes) = (payload.triangles(), payload.texture_bytes());
-        let (raw_bytes, extent) = (raw.len() as u64, Extent::of_payload(payload));
-        let made = Stored { key, bytes, raw_bytes, extent, triangles, texture_bytes };
-        let mut m = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        match m.payloads.insert(id, made) {
-            None => Ok(()),
-            Some(_) => Err(Fault::Refused(format!("a bake wrote payload {} twice", id.0))),
-        }
+        self.note(id, Stored::of(key, bytes, raw.len() as u64, payload))
+    }
+
+    fn kept(&self, ids: &[LocalPayload]) -> Result<bool, Fault> {
+        let whole = |id: &LocalPayload| {
+            let key = self.key(*id);
+            let (raw, bytes) = self.store.get_with_size(&key)?;
+            Some(Stored::of(key, bytes, raw.len() as u64, &unpack(&raw).ok()?))
+        };
+        let Some(all) = ids.iter().map(whole).collect::<Option<Vec<_>>>() else { return Ok(false) };
+        ids.iter().zip(all).try_for_each(|(id, s)| self.note(*id, s)).map(|()| true)
     }
 
     fn claim(&self, claim: Claim) {

@@ -1,26 +1,36 @@
-//! Intermediate results of bakes, kept in the store.
+//! What unfinished bakes know already, kept beside the store's blocks until they are whole.
 
-use farfield_core::Fault;
+use std::fs;
+
 use farfield_core::context::Memo;
 
 use super::{Key, Store, key};
 
-/// A memory behind which the store stands. What a bake remembers may depend on the scene and on captures, so both enter the key.
-pub struct StoreMemo<'a> {
-    /// The store.
-    pub store: &'a Store,
-    /// Hash of the scene and of the capturer's identity.
-    pub inputs: Key,
+/// The memory of one bake: a store of its own in `unfinished/`, whose folders appear with the first thing to remember.
+pub struct StoreMemo(Store);
+
+impl StoreMemo {
+    /// Of the bake with this key.
+    pub fn of(store: &Store, bake: &Key) -> Self {
+        let root = store.root.join("unfinished").join(super::hex(bake));
+        Self(Store { root, serial: Default::default(), report: store.report.clone() })
+    }
+
+    /// Forgets all: the bake is whole.
+    pub fn clear(&self) {
+        _ = fs::remove_dir_all(&self.0.root);
+    }
 }
 
-impl Memo for StoreMemo<'_> {
-    fn get_or(&self, own: &[u8; 32], make: &mut dyn FnMut() -> Result<Vec<u8>, Fault>) -> Result<Vec<u8>, Fault> {
-        let key = key("memo", &[&self.inputs, own]);
-        if let Some(known) = self.store.get(&key) {
-            return Ok(known);
+impl Memo for StoreMemo {
+    fn get(&self, own: &[u8]) -> Option<Vec<u8>> {
+        self.0.get(&key("memory", &[own]))
+    }
+
+    fn put(&self, own: &[u8], bytes: &[u8]) {
+        let put = fs::create_dir_all(self.0.aside()).and_then(|()| self.0.put(&key("memory", &[own]), bytes));
+        if let Err(e) = put {
+            (self.0.report)(format!("what is built cannot be remembered in {}: {e}", self.0.root.display()));
         }
-        let made = make()?;
-        self.store.put(&key, &made).map_err(|e| super::manifest::stored(&e))?;
-        Ok(made)
     }
 }

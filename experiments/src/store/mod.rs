@@ -2,7 +2,8 @@
 //!
 //! A block's file name is its key. It appears whole or not at all (written aside, synced, renamed), carries a checksum, and is
 //! never changed, so that builds can be killed and resumed, and several processes may share a store. A block whose checksum
-//! fails is reported, removed and built again. Layout: `blocks/ab/cdef...`, and `aside/` for what is being written.
+//! fails is reported, removed and built again. Layout: `blocks/ab/cdef...`, `aside/` for what is being written, and `unfinished/` for what a bake
+//! that is not yet whole remembers.
 
 mod keys;
 mod manifest;
@@ -12,6 +13,7 @@ mod meshes;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use farfield_core::Fault;
@@ -32,7 +34,7 @@ pub struct Store {
     root: PathBuf,
     serial: AtomicU64,
     /// Told of damaged blocks.
-    report: Box<dyn Fn(String) + Send + Sync>,
+    report: Arc<dyn Fn(String) + Send + Sync>,
 }
 
 impl Store {
@@ -40,7 +42,7 @@ impl Store {
     ///
     /// # Errors
     /// What making the folders gives.
-    pub fn open(root: &Path, report: Box<dyn Fn(String) + Send + Sync>) -> io::Result<Self> {
+    pub fn open(root: &Path, report: Arc<dyn Fn(String) + Send + Sync>) -> io::Result<Self> {
         fs::create_dir_all(root.join("blocks"))?;
         let aside = root.join("aside");
         fs::create_dir_all(&aside)?;
@@ -66,16 +68,21 @@ impl Store {
     }
 
     fn file(&self, key: &Key) -> PathBuf {
-        let name = key.iter().map(|b| format!("{b:02x}")).collect::<String>();
+        let name = hex(key);
         self.root.join("blocks").join(&name[..2]).join(&name[2..])
     }
 
     /// A block's bytes; `None` where it is absent or was damaged.
     pub fn get(&self, key: &Key) -> Option<Vec<u8>> {
+        self.get_with_size(key).map(|b| b.0)
+    }
+
+    /// A block's bytes, and the size of its file.
+    fn get_with_size(&self, key: &Key) -> Option<(Vec<u8>, u64)> {
         let bytes = self.whole(key)?;
         let raw = u64::from_le_bytes(bytes[4..12].try_into().ok()?);
         match zstd::bulk::decompress(&bytes[HEADER..], usize::try_from(raw).ok()?) {
-            Ok(raw) => Some(raw),
+            Ok(raw) => Some((raw, bytes.len() as u64)),
             Err(e) => self.damaged(key, &e.to_string()),
         }
     }
@@ -157,6 +164,10 @@ impl Store {
         File::open(folder)?.sync_all()?;
         Ok((HEADER + packed.len()) as u64)
     }
+}
+
+fn hex(key: &Key) -> String {
+    key.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 fn checksum(length: &[u8], packed: &[u8]) -> [u8; 32] {

@@ -1,16 +1,20 @@
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
 
+use farfield_core::context::{Context, Serial, remembered};
 use farfield_core::id::LocalPayload;
 use farfield_core::payload::{AtlasPart, MeshPart, Part, Payload};
 use farfield_core::strategy::Sink;
 use glam::{DVec3, Vec3};
 
 use super::*;
+use crate::build::NoCapture;
+use crate::progress::Bar;
 
 fn store(dir: &Path) -> (Store, Arc<Mutex<Vec<String>>>) {
     let said = Arc::new(Mutex::new(vec![]));
     let to = said.clone();
-    (Store::open(dir, Box::new(move |m| to.lock().unwrap().push(m))).unwrap(), said)
+    (Store::open(dir, Arc::new(move |m| to.lock().unwrap().push(m))).unwrap(), said)
 }
 
 fn payload() -> Payload {
@@ -81,10 +85,11 @@ fn keys_do_not_run_into_each_other() {
 fn a_bake_is_recorded_whatever_the_order_of_its_claims() {
     use farfield_core::claim::{Claim, Quantity};
     let claim = |i: u32| Claim { quantity: Quantity::HoleWidthPx, payload: Some(LocalPayload(i)), max: 2.0 };
+    let bar = Bar::default();
     let made = |order: &[u32]| {
         let dir = tempfile::tempdir().unwrap();
         let (s, _) = store(dir.path());
-        let r = Recorder::new(&s, key("asset", &[]));
+        let r = Recorder::new(&s, key("asset", &[]), &bar);
         for &i in order {
             r.put(LocalPayload(i), &payload()).unwrap();
             r.claim(claim(i));
@@ -97,4 +102,54 @@ fn a_bake_is_recorded_whatever_the_order_of_its_claims() {
         m
     };
     assert_eq!(made(&[0, 1, 2]), made(&[2, 0, 1]));
+}
+
+/// A bake in two pieces that is interrupted in the second: what it remembered is taken only while its payloads are whole.
+#[test]
+fn an_interrupted_bake_goes_on_from_what_is_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let (s, said) = store(dir.path());
+    let (asset, bar) = (key("asset", &[]), Bar::default());
+    // Which pieces are made, and the manifest; the piece `stop` is never made.
+    let bake = |stop: u32| {
+        let memo = StoreMemo::of(&s, &asset);
+        let cx = Context { capture: &NoCapture, run: &Serial, memo: &memo, cancel: &AtomicBool::new(false) };
+        let (sink, mut made) = (Recorder::new(&s, asset, &bar), vec![]);
+        for i in 0..2 {
+            let id = LocalPayload(i);
+            let mut make = || {
+                if i == stop {
+                    return Err(Fault::Cancelled);
+                }
+                made.push(i);
+                sink.put(id, &payload()).map(|()| 10 + i)
+            };
+            match remembered(&[i as u8], &|_: &u32| vec![id], &mut make, &sink, &cx) {
+                Ok(found) => assert_eq!(found, 10 + i),
+                Err(f) => {
+                    assert!(matches!(f, Fault::Cancelled));
+                    return (made, None);
+                }
+            }
+        }
+        let manifest = sink.finish(vec![]).unwrap();
+        memo.clear();
+        (made, Some(manifest))
+    };
+    let unfinished = dir.path().join("unfinished");
+    assert_eq!(bake(1), (vec![0], None));
+    assert!(fs::read_dir(&unfinished).unwrap().next().is_some());
+    assert_eq!(bake(1), (vec![], None));
+    // Its payload is damaged, then gone.
+    let block = s.file(&key("payload", &[&asset, &0u32.to_le_bytes()]));
+    fs::write(&block, b"nothing").unwrap();
+    assert_eq!(bake(1), (vec![0], None));
+    fs::remove_file(&block).unwrap();
+    assert_eq!(bake(1), (vec![0], None));
+    let (made, manifest) = bake(2);
+    assert_eq!(made, [1]);
+    // Nothing is left of the memory; a bake from the start leaves the same.
+    assert!(fs::read_dir(&unfinished).unwrap().next().is_none());
+    assert_eq!(bake(2), (vec![0, 1], manifest));
+    assert_eq!(said.lock().unwrap().len(), 1, "the damaged block alone");
 }

@@ -41,7 +41,7 @@ mod view;
 use std::collections::{BTreeMap, HashMap};
 
 use farfield_core::cell::Cell;
-use farfield_core::context::{Context, Executor, Serial, collect};
+use farfield_core::context::{Context, Executor, Serial, collect, remembered};
 use farfield_core::id::{AssetId, ChunkId, LocalPayload};
 use farfield_core::payload::{MeshPart, Part, Payload};
 use farfield_core::scene::{Gathered, Scene, gather};
@@ -53,7 +53,8 @@ use serde::{Deserialize, Serialize};
 use hierarchy::{Hierarchy, Unit};
 use index::{Group, Index, ObjectGroups, Patch};
 
-/// Objects of more triangles are built one after the other, their groups in parallel; smaller ones in parallel.
+/// Objects of more triangles are built one after the other, their groups in parallel, and remembered across interruptions; smaller ones in
+/// parallel.
 const LARGE_TRIANGLES: u64 = 100_000;
 
 /// Hierarchies of clusters.
@@ -294,9 +295,12 @@ impl FarField for ClusterLod {
         let (large, small): (Vec<u32>, Vec<u32>) =
             (0..firsts.len() as u32).partition(|o| triangles(o) > LARGE_TRIANGLES);
         let bake = |o: u32, run: &dyn Executor| self.bake(job, (o, firsts[o as usize]), run, out, cx);
+        let payloads = |made: &Option<ObjectGroups>| {
+            made.iter().flat_map(|m| &m.groups).map(|g| LocalPayload(g.payload)).collect()
+        };
         let mut objects = collect(cx.run, small.len(), &|i| bake(small[i], &Serial))?;
         for o in large {
-            objects.push(bake(o, cx.run)?);
+            objects.push(remembered(&o.to_le_bytes(), &payloads, &mut || bake(o, cx.run), out, cx)?);
         }
         let mut objects: Vec<ObjectGroups> = objects.into_iter().flatten().collect();
         objects.sort_by_key(|o| o.object);

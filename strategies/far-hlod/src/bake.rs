@@ -2,7 +2,7 @@
 //!
 //! Depth first, so that only the meshes beside the paths to the root are in memory, a path for each thread at work.
 
-use farfield_core::context::{Context, collect};
+use farfield_core::context::{Context, collect, remembered};
 use farfield_core::id::LocalPayload;
 use farfield_core::octahedral::rounded;
 use farfield_core::payload::{MeshPart, Part, Payload};
@@ -10,6 +10,7 @@ use farfield_core::scene::{Gathered, gather};
 use farfield_core::strategy::{SceneJob, Sink};
 use farfield_core::{Aabb, Fault};
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 use crate::cone::Cone;
 use crate::piece::Piece;
@@ -19,10 +20,11 @@ use crate::texture;
 use crate::tree::{Borders, Tree};
 use crate::{PointPolygonHlod, Primitives, points};
 
-/// Subtrees whose roots stand this deep or higher are independent jobs: up to 64 side by side.
+/// Subtrees whose roots stand this deep or higher are independent jobs, up to 64 side by side, and are remembered across interruptions.
 const PARALLEL_DEPTH: u32 = 2;
 
 /// A built subtree: what the levels above still need of it.
+#[derive(Serialize, Deserialize)]
 struct Built {
     piece: Piece,
     /// Empty for a leaf.
@@ -65,9 +67,22 @@ pub(crate) fn bake(
 impl Baker<'_> {
     fn subtree(&self, node: u32) -> Result<Built, Fault> {
         self.cx.check()?;
+        let depth = self.tree.octree.nodes[node as usize].depth;
         if self.tree.is_leaf(node) {
             return self.leaf(node);
         }
+        if depth == 0 || depth > PARALLEL_DEPTH {
+            return self.built(node);
+        }
+        let payloads = |b: &Built| {
+            let stored = (node..).zip(&b.nodes).filter(|(_, n)| n.parts > 0);
+            stored.map(|(id, _)| LocalPayload(id)).collect()
+        };
+        remembered(&node.to_le_bytes(), &payloads, &mut || self.built(node), self.out, self.cx)
+    }
+
+    /// A subtree of several nodes.
+    fn built(&self, node: u32) -> Result<Built, Fault> {
         let children: Vec<u32> = self.tree.octree.children(node).collect();
         let below = if self.tree.octree.nodes[node as usize].depth < PARALLEL_DEPTH {
             collect(self.cx.run, children.len(), &|i| self.subtree(children[i]))?

@@ -9,9 +9,10 @@ use farfield_core::id::ObjectId;
 use farfield_core::scene::{Gathered, Wedge};
 use farfield_core::strategy::{MeshView, SimplificationMetric, VertexSeen};
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// A node's geometry, positions not yet rounded.
-#[derive(Default)]
+#[derive(Default, Serialize, Deserialize)]
 pub(crate) struct Piece {
     /// Welded; it lists no textured triangles.
     pub(crate) mesh: Gathered,

@@ -1,12 +1,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use farfield_core::bvh::TriangleBvh;
 use farfield_core::camera::ViewModel;
 use farfield_core::cell::{Active, Outline};
 use farfield_core::claim::Claim;
-use farfield_core::context::{Capture, Executor, Forget, Serial, Shot};
+use farfield_core::context::{Capture, Executor, Forget, Memo, Serial, Shot};
 use farfield_core::draw::{Draw, DrawWhat};
 use farfield_core::id::{Block, CellId, LocalPayload, MaterialId, PayloadRef, SplitId, TextureId};
 use farfield_core::image::SurfaceImage;
@@ -66,19 +66,20 @@ fn settings(metric: &str) -> PointPolygonHlod {
     serde_json::from_str(&text).unwrap()
 }
 
+const VIEWS: ViewModel = ViewModel {
+    fov_y_rad: 1.0,
+    resolution: [640, 480],
+    near: 0.01,
+    eye_height: [0.0, 1.0],
+    pitch_rad: [0.0, 0.0],
+    max_speed: 1.0,
+    max_turn_rad: 1.0,
+};
+
 fn baked(scene: Scene, far: PointPolygonHlod, run: &dyn Executor) -> Baked {
-    let views = ViewModel {
-        fov_y_rad: 1.0,
-        resolution: [640, 480],
-        near: 0.01,
-        eye_height: [0.0, 1.0],
-        pitch_rad: [0.0, 0.0],
-        max_speed: 1.0,
-        max_turn_rad: 1.0,
-    };
     let (keep, go) = (Keep::default(), AtomicBool::new(false));
     let cx = Context { capture: &Blind, run, memo: &Forget, cancel: &go };
-    let index = far.bake_scene(&SceneJob { scene: &scene, views: &views }, &keep, &cx).unwrap();
+    let index = far.bake_scene(&SceneJob { scene: &scene, views: &VIEWS }, &keep, &cx).unwrap();
     let skeleton = Skeleton::decode("test", &index).unwrap();
     Baked { scene, index, skeleton, payloads: keep.0.into_inner().unwrap(), far }
 }
@@ -490,4 +491,70 @@ fn for_a_cell_nothing_finer_is_wanted_than_its_viewpoints_need() {
     for eye in [Vec3::new(3.0, 0.0, 0.0), Vec3::new(4.0, 0.9, -0.9), Vec3::new(5.0, 1.0, 1.0)] {
         assert!(wants(3.0, eye).is_subset(&ahead));
     }
+}
+
+/// Holds what was remembered and put over several bakes; the one that puts its `stop`th payload is interrupted there.
+#[derive(Default)]
+struct Interrupted<'a> {
+    memory: Mutex<BTreeMap<Vec<u8>, Vec<u8>>>,
+    stored: Mutex<BTreeMap<LocalPayload, Payload>>,
+    /// Of this bake: made, and taken from the one before.
+    counted: Mutex<[BTreeSet<LocalPayload>; 2]>,
+    stop: Option<(usize, &'a AtomicBool)>,
+}
+
+impl Memo for Interrupted<'_> {
+    fn get(&self, key: &[u8]) -> Option<Vec<u8>> {
+        self.memory.lock().unwrap().get(key).cloned()
+    }
+    fn put(&self, key: &[u8], bytes: &[u8]) {
+        let before = self.memory.lock().unwrap().insert(key.to_vec(), bytes.to_vec());
+        assert!(before.is_none_or(|b| b == bytes), "another piece of the same name");
+    }
+}
+
+impl Sink for Interrupted<'_> {
+    fn put(&self, id: LocalPayload, payload: &Payload) -> Result<(), Fault> {
+        self.stored.lock().unwrap().insert(id, payload.clone());
+        let mut counted = self.counted.lock().unwrap();
+        assert!(counted[0].insert(id) && !counted[1].contains(&id), "{id:?} put twice");
+        self.stop.iter().filter(|s| counted[0].len() == s.0).for_each(|s| s.1.store(true, Ordering::Relaxed));
+        Ok(())
+    }
+    fn kept(&self, ids: &[LocalPayload]) -> Result<bool, Fault> {
+        let stored = self.stored.lock().unwrap();
+        let whole = ids.iter().all(|i| stored.contains_key(i));
+        let mut counted = self.counted.lock().unwrap();
+        assert!(!whole || ids.iter().all(|i| counted[1].insert(*i) && !counted[0].contains(i)), "counted twice");
+        Ok(whole)
+    }
+    fn claim(&self, _: Claim) {}
+    fn left_out(&self, _: LeftOut) {}
+}
+
+#[test]
+fn an_interrupted_bake_goes_on_where_it_was() {
+    let whole = baked(balls(false), settings("hausdorff"), &Serial);
+    let all: BTreeSet<LocalPayload> = whole.payloads.keys().copied().collect();
+    let mut held = Interrupted::default();
+    let bake = |held: &Interrupted<'_>, go: &AtomicBool| {
+        let cx = Context { capture: &Blind, run: &Serial, memo: held, cancel: go };
+        whole.far.bake_scene(&SceneJob { scene: &whole.scene, views: &VIEWS }, held, &cx)
+    };
+    let go = AtomicBool::new(false);
+    held.stop = Some((all.len() / 2, &go));
+    assert!(matches!(bake(&held, &go), Err(Fault::Cancelled)));
+    // One of the payloads that a piece needs is lost meanwhile.
+    let lost = *held.stored.get_mut().unwrap().keys().next().unwrap();
+    held.stored.get_mut().unwrap().remove(&lost);
+    let first = std::mem::take(held.counted.get_mut().unwrap());
+    assert!(first[1].is_empty());
+    held.stop = None;
+    let index = bake(&held, &AtomicBool::new(false)).unwrap();
+    assert_eq!(index, whole.index);
+    assert_eq!(held.stored.into_inner().unwrap(), whole.payloads);
+    let [made, kept] = held.counted.into_inner().unwrap();
+    assert!(made.is_disjoint(&kept) && &made | &kept == all);
+    println!("{} payloads: {} before the interruption, {} of them kept", all.len(), first[0].len(), kept.len());
+    assert!(kept.len() * 2 > first[0].len(), "{} of {}", kept.len(), first[0].len());
 }

@@ -1,5 +1,6 @@
 //! Scenes on disk are those in memory, bit for bit.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use farfield_core::mesh::ChunkMesh;
@@ -13,7 +14,7 @@ use crate::load;
 static NEVER: AtomicBool = AtomicBool::new(false);
 
 fn store(folder: &Path) -> Store {
-    Store::open(folder, Box::new(|m| panic!("{m}"))).unwrap()
+    Store::open(folder, Arc::new(|m| panic!("{m}"))).unwrap()
 }
 
 /// The scene of a file on disk, cut with a limit that makes it divide several times.

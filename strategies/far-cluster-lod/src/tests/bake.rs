@@ -1,5 +1,9 @@
 //! What the bake writes: monotone, the same bytes in any order of jobs; what it refuses and leaves out.
 
+use std::sync::atomic::Ordering;
+
+use farfield_core::context::Memo;
+
 use super::*;
 
 #[test]
@@ -163,4 +167,56 @@ fn settings_that_make_no_sense_are_refused() {
     assert!(refused(ClusterLod { albedo_weight: f32::INFINITY, ..d() }).contains("albedo_weight"));
     let small = ClusterLod { least_triangles: 200, ..d() }.needs(&scene, None).unwrap();
     assert!(small.left_out[0].reason.contains("1 of 1 objects"), "{small:?}");
+}
+
+/// Remembers and keeps over several bakes; stops when it is asked to remember a second object.
+#[derive(Default)]
+struct Interrupted {
+    memory: Mutex<BTreeMap<Vec<u8>, Vec<u8>>>,
+    stored: Mutex<BTreeMap<LocalPayload, Payload>>,
+    put: Mutex<usize>,
+    stop: AtomicBool,
+}
+
+impl Memo for Interrupted {
+    fn get(&self, key: &[u8]) -> Option<Vec<u8>> {
+        self.stop.store(!self.memory.lock().unwrap().is_empty(), Ordering::Relaxed);
+        self.memory.lock().unwrap().get(key).cloned()
+    }
+    fn put(&self, key: &[u8], bytes: &[u8]) {
+        assert!(self.memory.lock().unwrap().insert(key.to_vec(), bytes.to_vec()).is_none());
+    }
+}
+
+impl Sink for Interrupted {
+    fn put(&self, id: LocalPayload, payload: &Payload) -> Result<(), Fault> {
+        *self.put.lock().unwrap() += 1;
+        self.stored.lock().unwrap().insert(id, payload.clone());
+        Ok(())
+    }
+    fn kept(&self, ids: &[LocalPayload]) -> Result<bool, Fault> {
+        Ok(ids.iter().all(|i| self.stored.lock().unwrap().contains_key(i)))
+    }
+    fn claim(&self, _: Claim) {}
+    fn left_out(&self, _: LeftOut) {}
+}
+
+#[test]
+fn an_interrupted_bake_keeps_the_large_objects_that_are_done() {
+    let n = 160;
+    assert!(u64::from(2 * n * (2 * n - 2)) > LARGE_TRIANGLES);
+    let away = DAffine3::from_translation(DVec3::new(4.0, 0.0, 0.0));
+    let whole = baked(&ClusterLod::default(), placed(vec![hills(n)], &[(0, away), (0, DAffine3::IDENTITY)]), &Serial);
+    let held = Interrupted::default();
+    let bake = |cancel: &AtomicBool| {
+        *held.put.lock().unwrap() = 0;
+        let cx = Context { capture: &Blind, run: &Serial, memo: &held, cancel };
+        ClusterLod::default().bake_scene(&SceneJob { scene: &whole.scene, views: &VIEWS }, &held, &cx)
+    };
+    assert!(matches!(bake(&held.stop), Err(Fault::Cancelled)));
+    let first = whole.index.objects[0].groups.len();
+    assert!(first > 20 && *held.put.lock().unwrap() == first);
+    assert_eq!(bake(&AtomicBool::new(false)).unwrap(), whole.bytes);
+    assert_eq!(*held.put.lock().unwrap(), whole.payloads.len() - first, "the second object alone");
+    assert_eq!(*held.stored.lock().unwrap(), whole.payloads);
 }

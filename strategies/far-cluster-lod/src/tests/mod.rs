@@ -64,19 +64,20 @@ struct Baked {
     index: Index,
 }
 
+const VIEWS: ViewModel = ViewModel {
+    fov_y_rad: 1.0,
+    resolution: [64, 64],
+    near: 0.01,
+    eye_height: [1.0, 2.0],
+    pitch_rad: [0.0; 2],
+    max_speed: 1.0,
+    max_turn_rad: 1.0,
+};
+
 fn baked(own: &ClusterLod, scene: Scene, run: &dyn Executor) -> Baked {
     let (sink, go) = (Keep::default(), AtomicBool::new(false));
     let cx = Context { capture: &Blind, run, memo: &Forget, cancel: &go };
-    let views = ViewModel {
-        fov_y_rad: 1.0,
-        resolution: [64, 64],
-        near: 0.01,
-        eye_height: [1.0, 2.0],
-        pitch_rad: [0.0; 2],
-        max_speed: 1.0,
-        max_turn_rad: 1.0,
-    };
-    let bytes = own.bake_scene(&SceneJob { scene: &scene, views: &views }, &sink, &cx).unwrap();
+    let bytes = own.bake_scene(&SceneJob { scene: &scene, views: &VIEWS }, &sink, &cx).unwrap();
     let index = Index::decode("test", &bytes).unwrap();
     let payloads = sink.0.into_inner().unwrap();
     for (&id, payload) in &payloads {
