@@ -166,7 +166,7 @@ impl Site<'_> {
         let asset = key("scene asset", &[&base, identity.as_bytes()]);
         let bar = self.progress.scene(&pipeline.name);
         let job = SceneJob { scene: self.scene, views: self.views };
-        let made = self.asset(&asset, &bar, &|sink, cx| pipeline.far_field.bake_scene(&job, sink, cx));
+        let made = self.asset(&asset, &bar, |sink, cx| pipeline.far_field.bake_scene(&job, sink, cx));
         bar.done();
         made.map(|(manifest, new)| (asset, manifest, new))
     }
@@ -176,7 +176,7 @@ impl Site<'_> {
         &self,
         asset: &Key,
         bar: &Bar,
-        bake: &dyn Fn(&Recorder<'_>, &Context<'_>) -> Result<Vec<u8>, Fault>,
+        bake: impl Fn(&Recorder<'_>, &Context<'_>) -> Result<Vec<u8>, Fault>,
     ) -> Result<(Manifest, bool), Fault> {
         let memo = StoreMemo::of(self.store, asset);
         let known = self.whole(asset);
@@ -222,7 +222,7 @@ impl Site<'_> {
             shared: shared.map(|s| s.1.index.as_slice()),
         };
         let bar = Bar::default();
-        let (manifest, new) = self.asset(&asset, &bar, &|sink, cx| pipeline.far_field.bake_cell(&job, sink, cx))?;
+        let (manifest, new) = self.asset(&asset, &bar, |sink, cx| pipeline.far_field.bake_cell(&job, sink, cx))?;
         Ok((id, BuiltCell { cell, manifest: Some(manifest) }, needs, new))
     }
 
