@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use farfield_experiments::config::Generated;
+use farfield_experiments::config::{BackendName, Generated};
 
 use clap::{Parser, Subcommand};
 
@@ -130,6 +130,12 @@ pub(crate) enum Command {
         #[arg(long, default_value = "compare.html")]
         out: PathBuf,
     },
+    /// What a small point and a small line cost in triangles, on each backend that there is: the setting `point_cost`.
+    Calibrate {
+        /// This backend alone.
+        #[arg(long, value_parser = PossibleValuesParser::new(BackendName::ALL.map(BackendName::name)).try_map(backend))]
+        backend: Option<BackendName>,
+    },
     /// Generates a scene as .glb, .obj or .ply.
     Scene {
         /// What to generate.
@@ -145,6 +151,10 @@ pub(crate) enum Command {
         #[arg(long)]
         out: PathBuf,
     },
+}
+
+fn backend(name: String) -> Result<BackendName, String> {
+    BackendName::ALL.into_iter().find(|b| b.name() == name).ok_or(name)
 }
 
 /// A place in the world, scene units.

@@ -8,7 +8,7 @@ use farfield_experiments::config::{self, Experiment, Generated};
 use farfield_experiments::failure::Failure;
 use farfield_experiments::results::Summary;
 use farfield_experiments::run::{self, Options};
-use farfield_experiments::{images, list, plan, report, sample, scene};
+use farfield_experiments::{calibrate, images, list, plan, report, sample, scene};
 
 use crate::args::{Args, Command, Input};
 
@@ -49,7 +49,8 @@ pub(crate) fn run(args: Args, cancel: &AtomicBool) -> Result<(), Failure> {
             })
         }
         Command::Compare { runs, out } => compare(&runs, &out),
-        Command::Scene { kind, triangles, seed, out } => generate(kind, triangles, seed, &out),
+        Command::Calibrate { backend } => print(&calibrate::calibrate(backend)?),
+        Command::Scene { kind, triangles, seed, out } => generate(kind, triangles, seed, &out, cancel),
     }
 }
 
@@ -105,9 +106,15 @@ fn compare(runs: &[PathBuf], out: &Path) -> Result<(), Failure> {
     print(&format!("{table}\nreport: {}\n", out.display()))
 }
 
-fn generate(kind: Generated, triangles: Option<u64>, seed: u64, out: &Path) -> Result<(), Failure> {
+fn generate(
+    kind: Generated,
+    triangles: Option<u64>,
+    seed: u64,
+    out: &Path,
+    cancel: &AtomicBool,
+) -> Result<(), Failure> {
     if kind == Generated::Asteroid && out.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply")) {
-        let written = scene::write_asteroid(out, triangles, seed)?;
+        let written = scene::write_asteroid(out, triangles, seed, cancel)?;
         return print(&format!("{}: {written} triangles, 1 object\n", out.display()));
     }
     let parts = scene::generate(kind, triangles, seed)?;

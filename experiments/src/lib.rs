@@ -2,6 +2,7 @@
 
 pub mod audit;
 pub mod build;
+pub mod calibrate;
 pub mod chunks;
 pub mod config;
 pub mod export;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use farfield_core::draw::Shading;
 use farfield_core::id::MaterialId;
@@ -254,11 +255,12 @@ pub fn generate(kind: Generated, triangles: Option<u64>, seed: u64) -> Result<Pa
 /// Writes an asteroid as PLY without holding it; returns its triangles.
 ///
 /// # Errors
-/// [`Failure::Input`] where there is none of that many triangles; what writing gives. No unfinished file is left.
-pub fn write_asteroid(file: &Path, triangles: Option<u64>, seed: u64) -> Result<u64, Failure> {
+/// [`Failure::Input`] where there is none of that many triangles; [`Failure::Cancelled`]; what writing gives. No unfinished file is left.
+pub fn write_asteroid(file: &Path, triangles: Option<u64>, seed: u64, cancel: &AtomicBool) -> Result<u64, Failure> {
     let settings = AsteroidSettings { triangles: triangles.unwrap_or(Generated::Asteroid.triangles()), seed };
     let failed = |e: std::io::Error| match e.kind() {
         std::io::ErrorKind::InvalidInput => Failure::input("the scene was not generated", e),
+        std::io::ErrorKind::Interrupted => Failure::Cancelled,
         _ => Failure::work(format!("{} cannot be written", file.display()), e),
     };
     let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -267,7 +269,7 @@ pub fn write_asteroid(file: &Path, triangles: Option<u64>, seed: u64) -> Result<
     #[cfg(unix)]
     new.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut out = std::io::BufWriter::new(new.tempfile_in(folder).map_err(failed)?);
-    let made = generate::asteroid::write_ply(&settings, &mut out).map_err(failed)?;
+    let made = generate::asteroid::write_ply(&settings, &mut out, &|| stream::go_on(cancel)).map_err(failed)?;
     let whole = out.into_inner().map_err(|e| failed(e.into_error()))?;
     whole.persist(file).map_err(|e| failed(e.error))?;
     Ok(made)

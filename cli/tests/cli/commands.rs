@@ -256,3 +256,13 @@ fn the_example_pipes_run() {
     assert!(said.contains("frustum culled"), "{said}");
     assert!(f.path("out/report.html").is_file());
 }
+
+#[test]
+fn calibrate_tells_what_small_primitives_cost_on_a_backend() {
+    let f = Folder::new();
+    let said = f.ok(&["calibrate", "--backend", "cpu"]);
+    let line: Vec<&str> = said.lines().nth(1).unwrap().split_whitespace().collect();
+    let costs: Vec<f64> = line[line.len() - 3..].iter().map(|n| n.parse().unwrap()).collect();
+    assert!(said.lines().count() == 2 && line[0] == "cpu" && costs.iter().all(|c| *c > 0.0), "{said}");
+    assert_eq!(f.fails(&["calibrate", "--backend", "gl"]).0, 2);
+}

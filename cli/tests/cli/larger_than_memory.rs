@@ -281,7 +281,10 @@ fn thirty_million_triangles_in_512_mb() {
             number(&p["far_error_px"]["max"]),
             number(&p["far_error_px"]["mean"]),
         );
-        println!("stated error by frame, px: {:?}", column(&f, "walk", "far_error_px"));
+        let errors = column(&f, "walk", "far_error_px");
+        println!("stated error by frame, px: {errors:?}");
+        // Memory holds less than half a pixel asks for close by; a few times as much is uncovered by no turn and no step.
+        assert!(errors.iter().all(|e| *e < 4.0));
         assert!(column(&f, "walk", "missing_blocks").iter().all(|&m| m == 0.0));
         work.push(levels.iter().map(|l| l[1] as f64).sum::<f64>() / original);
         if work.len() == 1 {

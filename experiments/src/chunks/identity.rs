@@ -11,11 +11,11 @@ use std::time::{Duration, SystemTime};
 
 use crate::store::{Key, Store, key};
 
-/// The digest of a file's contents (BLAKE3).
+/// The digest of a file's contents (BLAKE3). `go_on` is asked after every megabyte.
 ///
 /// # Errors
-/// What reading gives.
-pub fn digest(store: &Store, file: &Path) -> io::Result<[u8; 32]> {
+/// What reading gives, and what `go_on` does.
+pub fn digest(store: &Store, file: &Path, go_on: &dyn Fn() -> io::Result<()>) -> io::Result<[u8; 32]> {
     let path = std::path::absolute(file)?;
     let (before, began) = (std::fs::metadata(&path)?, SystemTime::now());
     // Devices and pipes may never end.
@@ -30,6 +30,7 @@ pub fn digest(store: &Store, file: &Path) -> io::Result<[u8; 32]> {
     let mut reader = File::open(&path)?;
     let mut buffer = vec![0; 1 << 20];
     loop {
+        go_on()?;
         match reader.read(&mut buffer)? {
             0 => break,
             n => _ = hash.update(&buffer[..n]),

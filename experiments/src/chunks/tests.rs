@@ -263,7 +263,12 @@ fn contents_are_known_by_their_file_until_it_changes() {
     let store = Store::open(&dir.path().join("store"), Arc::new(|m| panic!("{m}"))).unwrap();
     let file = dir.path().join("a");
     std::fs::write(&file, b"one").unwrap();
-    let is = |bytes: &[u8]| assert_eq!(identity::digest(&store, &file).unwrap(), *blake3::hash(bytes).as_bytes());
+    let is = |bytes: &[u8]| {
+        assert_eq!(identity::digest(&store, &file, &|| Ok(())).unwrap(), *blake3::hash(bytes).as_bytes())
+    };
+    let stop = || Err(std::io::ErrorKind::Interrupted.into());
+    let stopped = identity::digest(&store, &file, &stop).unwrap_err();
+    assert_eq!(stopped.kind(), std::io::ErrorKind::Interrupted);
     is(b"one");
     // As fast as can be, and of the same length.
     std::fs::write(&file, b"two").unwrap();

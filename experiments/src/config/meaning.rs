@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 
 use super::mistakes::Collector;
 use super::node::{At, Node, What};
-use super::settings::{BuildWhen, Generated};
+use super::settings::{BuildWhen, Generated, LEAST_MEMORY, SceneSettings};
 use crate::generate::{HOUSE_EYE, PLANT_EYE, gallery_height};
 use crate::path::{PATHS, ROUTE};
 
@@ -66,6 +66,13 @@ fn scene(root: &Node, resolved: &mut Map<String, Value>, folder: &Path, mistakes
             let help =
                 "`farfield scene ... --out FILE.ply` writes it to a file that can be read out of core".to_owned();
             mistakes.add(&at(root, "scene", "out_of_core"), message, "not here", Some(help));
+        }
+        // A resolved experiment says the default, and what is no size has been told already.
+        let default = SceneSettings::default().memory_bytes;
+        if scene.get("memory_bytes").and_then(Value::as_u64).is_some_and(|b| b >= LEAST_MEMORY && b != default) {
+            let message = format!("a generated {} is held in memory, whatever it takes", kind.name());
+            let help = "`memory_bytes` in [budget] is the most that a walk holds".to_owned();
+            mistakes.add(&at(root, "scene", "memory_bytes"), message, "not here", Some(help));
         }
     }
     for (key, wanted) in [("path", "file"), ("models", "folder")] {

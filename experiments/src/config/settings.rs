@@ -101,9 +101,12 @@ pub struct SceneSettings {
     /// files (counted threefold where gzipped) are larger than a fifth of `memory_bytes` and can be read piece by piece: .ply, .obj, .gltf, .glb.
     pub out_of_core: Option<bool>,
     /// Out of core, the most bytes of original triangles that are held at once, and about the most while a model is cut.
-    #[schemars(range(min = 16_777_216), extend("unit" = "bytes"))]
+    #[schemars(range(min = LEAST_MEMORY), extend("unit" = "bytes"))]
     pub memory_bytes: u64,
 }
+
+/// Room for a few of the largest chunks, bytes.
+pub(super) const LEAST_MEMORY: u64 = 16 << 20;
 
 impl Default for SceneSettings {
     fn default() -> Self {
@@ -332,6 +335,9 @@ pub enum BackendName {
 }
 
 impl BackendName {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Cpu, Self::Vulkan, Self::Wgpu];
+
     /// As experiment files spell it.
     pub fn name(self) -> &'static str {
         match self {

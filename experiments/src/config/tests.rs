@@ -193,4 +193,6 @@ fn scenes_out_of_core_are_files_and_have_room_for_chunks() {
     assert!(all.len() == 1 && all[0].contains("a generated park is held in memory"), "{all:?}");
     let all = told(GOOD, &["scene.memory_bytes=1000"]);
     assert!(all.len() == 1 && all[0].contains("`memory_bytes` is a whole number from 16777216 (bytes)"), "{all:?}");
+    let all = told(GOOD, &["scene.memory_bytes=33554432"]);
+    assert!(all.len() == 1 && all[0].contains("a generated park is held in memory, whatever it takes"), "{all:?}");
 }

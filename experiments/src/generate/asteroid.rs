@@ -163,7 +163,7 @@ pub fn asteroid(s: &AsteroidSettings) -> Result<TriangleMesh, GenerateError> {
 ///
 /// # Errors
 /// [`GenerateError::Total`], of kind `InvalidInput`, where the total is out of range; what writing gives.
-pub fn write_ply(s: &AsteroidSettings, out: &mut impl Write) -> io::Result<u64> {
+pub fn write_ply(s: &AsteroidSettings, out: &mut impl Write, go_on: &dyn Fn() -> io::Result<()>) -> io::Result<u64> {
     let grid = Grid::new(s).map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
     let (vertices, squares) = (grid.vertices(), grid.squares());
     write!(
@@ -175,6 +175,7 @@ pub fn write_ply(s: &AsteroidSettings, out: &mut impl Write) -> io::Result<u64> 
     )?;
     let mut bytes = vec![];
     for first in (0..vertices).step_by(BATCH as usize) {
+        go_on()?;
         let last = (first + BATCH).min(vertices);
         let made: Vec<(Vec3, [u8; 4])> = (first..last).into_par_iter().map(|i| grid.vertex(i)).collect();
         bytes.clear();
@@ -185,6 +186,7 @@ pub fn write_ply(s: &AsteroidSettings, out: &mut impl Write) -> io::Result<u64> 
         out.write_all(&bytes)?;
     }
     for first in (0..squares).step_by(BATCH as usize) {
+        go_on()?;
         bytes.clear();
         for t in (first..(first + BATCH).min(squares)).flat_map(|i| grid.triangles(i)) {
             bytes.push(3);
@@ -238,7 +240,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a.ply");
         let mut bytes = vec![];
-        assert_eq!(write_ply(&settings, &mut bytes).unwrap(), asteroid(&settings).unwrap().triangles() as u64);
+        assert_eq!(
+            write_ply(&settings, &mut bytes, &|| Ok(())).unwrap(),
+            asteroid(&settings).unwrap().triangles() as u64
+        );
         std::fs::write(&file, bytes).unwrap();
         let (read, ..) = crate::load::load_mesh(&file, &crate::load::LoadOptions::default()).unwrap();
         let corners = |m: &TriangleMesh| -> Vec<(Vec3, [u8; 4])> {
@@ -246,6 +251,8 @@ mod tests {
         };
         assert_eq!(corners(&read), corners(&asteroid(&settings).unwrap()));
         let too_many = AsteroidSettings { triangles: MOST_ASTEROID + 1, seed: 5 };
-        assert_eq!(write_ply(&too_many, &mut vec![]).unwrap_err().kind(), io::ErrorKind::InvalidInput);
+        let stop = || Err(io::ErrorKind::Interrupted.into());
+        assert_eq!(write_ply(&settings, &mut vec![], &stop).unwrap_err().kind(), io::ErrorKind::Interrupted);
+        assert_eq!(write_ply(&too_many, &mut vec![], &|| Ok(())).unwrap_err().kind(), io::ErrorKind::InvalidInput);
     }
 }

@@ -314,10 +314,11 @@ fn uri_file(path: &Path, uri: &str) -> Option<PathBuf> {
 /// A file as a buffer; `None` where it has to be unpacked, or is none.
 fn kept(path: &Path) -> Result<Option<Buffer<'static>>, LoadError> {
     let failed = |cause| LoadError::Read { file: path.to_owned(), cause };
-    let Ok(file) = File::open(path) else { return Ok(None) };
-    let meta = file.metadata().map_err(failed)?;
+    // Opening a pipe waits for its writer.
+    let Some(meta) = std::fs::metadata(path).ok().filter(|m| m.is_file()) else { return Ok(None) };
+    let file = File::open(path).map_err(failed)?;
     let mut magic = [0; 2];
-    let plain = meta.is_file() && meta.len() > 2 && file.read_at(&mut magic, 0).is_ok() && magic != [0x1f, 0x8b];
+    let plain = meta.len() > 2 && file.read_at(&mut magic, 0).is_ok() && magic != [0x1f, 0x8b];
     Ok(plain.then(|| Buffer::Kept { file, start: 0, len: meta.len() }))
 }
 

@@ -87,7 +87,7 @@ pub struct PointPolygonHlod {
     #[serde(default)]
     pub primitives: Primitives,
     /// What a point costs to draw: points replace the small triangles of a node where they are cheaper. The default is that of a software
-    /// rasteriser on a processor; the benchmark of primitives measures a backend's.
+    /// rasteriser on a processor; `farfield calibrate` measures a backend's.
     #[serde(default = "point_cost")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "unit" = "triangles"))]
     pub point_cost: f32,

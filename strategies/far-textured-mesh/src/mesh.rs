@@ -388,4 +388,40 @@ mod tests {
         // One view: nothing but new positions is refused.
         assert_eq!(allowed(false), [true, true, true, true, true, false]);
     }
+
+    /// Estimates nothing right: no edge costs anything, and at the end every triangle that was changed turns out to be off by nine pixels. Counts
+    /// how often it is asked then.
+    struct Late<'a>(&'a std::cell::Cell<usize>, &'a [u32]);
+    impl Cost for Late<'_> {
+        fn costs(&mut self, _mesh: &LiveMesh, edges: &[[u32; 2]], out: &mut [Candidate]) {
+            edges.iter().zip(out).for_each(|(_, o)| *o = Candidate { cost: 0.0, place: Place::First });
+        }
+        fn verifies(&self) -> bool {
+            true
+        }
+        fn verify(&mut self, mesh: &LiveMesh) -> Vec<f32> {
+            self.0.set(self.0.get() + 1);
+            let off = |(t, was): (u32, &[u32])| if mesh.corners(t) == was { 0.0 } else { 9.0 };
+            (0..).zip(self.1.chunks_exact(3)).map(off).collect()
+        }
+    }
+
+    /// A metric that looks over the whole at the end is asked then, and what it finds too far off is taken back.
+    #[test]
+    fn what_a_metric_finds_at_the_end_counts() {
+        // A strip.
+        let places: Vec<Vec3> = (0..8).map(|i| Vec3::new((i / 2) as f32, (i % 2) as f32, 0.0)).collect();
+        let indices: Vec<u32> =
+            (0..3).flat_map(|k| [2 * k, 2 * k + 2, 2 * k + 1, 2 * k + 1, 2 * k + 2, 2 * k + 3]).collect();
+        let seen = vec![VertexSeen::default(); 8];
+        let left = |max_cost: f32, asked: &std::cell::Cell<usize>| {
+            let live = LiveMesh::new(&places, &indices, &[false; 8]).unwrap();
+            let mut cost = Constrained { inner: Box::new(Late(asked, &indices)), seen: &seen, several_views: false };
+            let settings = Settings { max_cost, min_triangles: 3, link_condition: false, ..Settings::default() };
+            collapse(live, &mut cost, &settings).triangles.len()
+        };
+        let asked = std::cell::Cell::new(0);
+        let found = [10.0, 1.0].map(|most| (left(most, &asked), asked.take()));
+        assert!(found[0].0 < 6 && found[0].1 > 0 && found[1].0 == 6, "triangles and times asked: {found:?}");
+    }
 }

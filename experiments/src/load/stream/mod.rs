@@ -67,10 +67,15 @@ impl<'a> Work<'a> {
     }
 
     fn go_on(&self) -> io::Result<()> {
-        match self.cancel.load(Ordering::Relaxed) {
-            true => Err(io::ErrorKind::Interrupted.into()),
-            false => Ok(()),
-        }
+        go_on(self.cancel)
+    }
+}
+
+/// An error of the kind that means it, once somebody wants it to stop.
+pub(crate) fn go_on(cancel: &AtomicBool) -> io::Result<()> {
+    match cancel.load(Ordering::Relaxed) {
+        true => Err(io::ErrorKind::Interrupted.into()),
+        false => Ok(()),
     }
 }
 
@@ -84,6 +89,15 @@ pub struct Keep<'a> {
     pub cancel: &'a AtomicBool,
     /// Told when a file is cut.
     pub say: &'a (dyn Fn(&str) + Sync),
+}
+
+impl Keep<'_> {
+    fn digest(&self, file: &Path) -> Result<[u8; 32], LoadError> {
+        identity::digest(self.store, file, &|| go_on(self.cancel)).map_err(|cause| match cause.kind() {
+            io::ErrorKind::Interrupted => LoadError::Cancelled,
+            _ => LoadError::Read { file: file.to_owned(), cause },
+        })
+    }
 }
 
 /// A scene on disk.
@@ -150,13 +164,9 @@ impl Format {
 pub fn open(path: &Path, options: &LoadOptions, keep: &Keep<'_>) -> Result<Streamed, LoadError> {
     let root = root(path, options)?;
     let files = if path.is_dir() { folder::files(path)? } else { vec![path.to_owned()] };
-    let failed = |file: &Path| {
-        let file = file.to_owned();
-        move |cause| LoadError::Read { file, cause }
-    };
     let mut digests = vec![];
     for f in &files {
-        digests.push(identity::digest(keep.store, f).map_err(failed(f))?);
+        digests.push(keep.digest(f)?);
     }
     let parts: Vec<&[u8]> = std::iter::once(VERSION).chain(digests.iter().map(<[u8; 32]>::as_slice)).collect();
     let name = key("chunks", &parts);
@@ -165,7 +175,7 @@ pub fn open(path: &Path, options: &LoadOptions, keep: &Keep<'_>) -> Result<Strea
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
     let known = home.exists().then(|| ChunkFile::open(&home, keep.memory_bytes));
     let file = match known {
-        Some(Ok(f)) if beside_is(f.kept(), folder, keep.store) => f,
+        Some(Ok(f)) if beside_is(f.kept(), folder, keep) => f,
         other => {
             if let Some(Err(e)) = other {
                 (keep.say)(&format!("{e}; it is made anew"));
@@ -192,8 +202,8 @@ pub fn open(path: &Path, options: &LoadOptions, keep: &Keep<'_>) -> Result<Strea
 }
 
 /// Whether the files beside the input are those that a chunk file was made with.
-fn beside_is(kept: &Kept, folder: &Path, store: &Store) -> bool {
-    kept.beside.iter().all(|(name, digest)| identity::digest(store, &folder.join(name)).ok() == *digest)
+fn beside_is(kept: &Kept, folder: &Path, keep: &Keep<'_>) -> bool {
+    kept.beside.iter().all(|(name, digest)| keep.digest(&folder.join(name)).ok() == *digest)
 }
 
 /// A file for positioned reads: itself, or what a gzipped one unpacks to.
@@ -256,7 +266,7 @@ fn make(files: &[PathBuf], digests: &[[u8; 32]], folder: &Path, home: &Path, kee
     }
     // What was read is what the file's name says.
     for (file, digest) in files.iter().zip(digests) {
-        let now = identity::digest(keep.store, file).map_err(|cause| LoadError::Read { file: file.clone(), cause })?;
+        let now = keep.digest(file)?;
         if now != *digest {
             return Err(LoadError::data(file, "contents", "the file changed while it was read"));
         }
@@ -305,7 +315,11 @@ fn append<C: Corner>(read: Read<'_, C>, writer: &mut Writer, folder: &Path, keep
     }
     for file in &textures.beside {
         let name = file.strip_prefix(folder).unwrap_or(file).to_string_lossy().into_owned();
-        writer.kept().beside.push((name, identity::digest(keep.store, file).ok()));
+        let digest = match keep.digest(file) {
+            Err(LoadError::Cancelled) => return Err(LoadError::Cancelled),
+            known => known.ok(),
+        };
+        writer.kept().beside.push((name, digest));
     }
     let textures: Vec<Texture> = textures.finish();
     textures.iter().try_for_each(|t| writer.texture(t)).map_err(failed)?;

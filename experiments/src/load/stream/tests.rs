@@ -295,6 +295,19 @@ fn gltf((positions, triangles): &(Vec<[f32; 3]>, Vec<[u32; 3]>), glb: bool, norm
     (out, bin)
 }
 
+/// A pipe would make whoever opens it wait for a writer.
+#[test]
+fn a_buffer_that_is_a_pipe_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = put(dir.path(), "a.gltf", &gltf(&ball(60, true), false, true).0);
+    let made = std::process::Command::new("mkfifo").arg(dir.path().join("a.bin")).status();
+    assert!(made.unwrap().success());
+    let store = store(&dir.path().join("store"));
+    let keep = Keep { store: &store, memory_bytes: 2 << 20, cancel: &NEVER, say: &|_| () };
+    let refused = open(&path, &LoadOptions::default(), &keep).map(drop).unwrap_err().to_string();
+    assert!(refused.contains("a.bin") && refused.contains("not a plain file"), "{refused}");
+}
+
 #[test]
 fn a_gltf_on_disk_is_the_gltf_in_memory() {
     let dir = tempfile::tempdir().unwrap();
