@@ -14,7 +14,7 @@ pub use builder::{ChunkDigest, Placement, SceneBuilder};
 pub use chunk_set::ChunkSet;
 pub use cut::{Cell, CutMesh, Cutter, MAX_CHUNK_TRIANGLES, centroid, cut};
 pub use looks::{normal_matrix, texture_at, vertex_albedo, vertex_tint};
-pub use wedges::{Gathered, Textured, Wedge, gather};
+pub use wedges::{Gathered, Textured, Wedge, WedgesOfVertices, gather};
 
 use std::ops::Range;
 

@@ -59,6 +59,26 @@ pub struct Gathered {
     pub names: Vec<(ObjectId, u32)>,
 }
 
+/// Which wedges vertices have.
+#[derive(Clone, Debug)]
+pub struct WedgesOfVertices {
+    ends: Vec<u32>,
+    wedges: Vec<u32>,
+}
+
+impl WedgesOfVertices {
+    /// One vertex's.
+    pub fn of(&self, vertex: u32) -> &[u32] {
+        let start = vertex.checked_sub(1).map_or(0, |v| self.ends[v as usize]);
+        &self.wedges[start as usize..self.ends[vertex as usize] as usize]
+    }
+
+    /// Each vertex's, in order.
+    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        (0..self.ends.len() as u32).map(|v| self.of(v))
+    }
+}
+
 impl Gathered {
     /// The three vertices of a triangle.
     pub fn vertices(&self, corners: [u32; 3]) -> [u32; 3] {
@@ -70,11 +90,20 @@ impl Gathered {
         self.vertices(corners).map(|v| self.positions[v as usize])
     }
 
-    /// For each vertex its wedges.
-    pub fn wedges_of_vertices(&self) -> Vec<Vec<u32>> {
-        let mut out = vec![vec![]; self.positions.len()];
-        (0u32..).zip(&self.wedges).for_each(|(i, w)| out[w.vertex as usize].push(i));
-        out
+    /// For each vertex its wedges, ascending. O(vertices + wedges); 4 bytes each.
+    pub fn wedges_of_vertices(&self) -> WedgesOfVertices {
+        let mut ends = vec![0u32; self.positions.len()];
+        self.wedges.iter().for_each(|w| ends[w.vertex as usize] += 1);
+        // Where each vertex's begin; moved to where they end while they are put there.
+        let mut sum = 0;
+        ends.iter_mut().for_each(|e| sum += std::mem::replace(e, sum));
+        let mut wedges = vec![0; self.wedges.len()];
+        for (i, w) in (0u32..).zip(&self.wedges) {
+            let at = &mut ends[w.vertex as usize];
+            wedges[*at as usize] = i;
+            *at += 1;
+        }
+        WedgesOfVertices { ends, wedges }
     }
 
     /// The wedge that looks most like another: least squared difference of normals and of albedo (over 255), the first of equals.

@@ -112,8 +112,8 @@ impl Piece {
         }
         let m = &self.mesh;
         let wedges = m.wedges_of_vertices();
-        let locked: Vec<bool> = self.outside(own).zip(&wedges).map(|(out, w)| out || w.len() > 1).collect();
-        let first = |v: &Vec<u32>| v.first().map(|&w| m.wedges[w as usize]);
+        let locked: Vec<bool> = self.outside(own).zip(wedges.iter()).map(|(out, w)| out || w.len() > 1).collect();
+        let first = |v: &[u32]| v.first().map(|&w| m.wedges[w as usize]);
         let normals: Vec<Vec3> = wedges.iter().map(|v| first(v).map_or(Vec3::Y, |w| w.normal)).collect();
         let albedo: Vec<[u8; 4]> = wedges.iter().map(|v| first(v).map_or([0; 4], |w| w.albedo)).collect();
         let indices: Vec<u32> = m.corners.iter().flat_map(|&c| m.vertices(c)).collect();
@@ -127,7 +127,7 @@ impl Piece {
         let corner = |w: u32| {
             let wedge = &m.wedges[w as usize];
             let vertex = left.remap[wedge.vertex as usize];
-            if vertex == wedge.vertex { w } else { m.alike(&wedges[vertex as usize], wedge) }
+            if vertex == wedge.vertex { w } else { m.alike(wedges.of(vertex), wedge) }
         };
         let corners = left.triangles.iter().map(|&t| m.corners[t as usize].map(corner)).collect();
         let two_sided = left.triangles.iter().map(|&t| m.two_sided[t as usize]).collect();

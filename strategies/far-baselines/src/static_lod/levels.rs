@@ -11,7 +11,7 @@ use farfield_core::collapse::{
 };
 use farfield_core::context::Context;
 use farfield_core::payload::MeshPart;
-use farfield_core::scene::{Gathered, Texture};
+use farfield_core::scene::{Gathered, Texture, WedgesOfVertices};
 use glam::Vec3;
 
 use super::StaticLod;
@@ -69,7 +69,7 @@ pub(super) fn levels(
                 corners[t as usize].map(|w| {
                     let wedge = &source.wedges[w as usize];
                     let vertex = left.remap[wedge.vertex as usize];
-                    if vertex == wedge.vertex { w } else { source.alike(&wedges[vertex as usize], wedge) }
+                    if vertex == wedge.vertex { w } else { source.alike(wedges.of(vertex), wedge) }
                 })
             })
             .collect();
@@ -94,17 +94,17 @@ const COLOUR_WEIGHT: f32 = 0.5;
 struct Coloured<'a> {
     quadrics: Quadrics,
     source: &'a Gathered,
-    wedges: &'a [Vec<u32>],
+    wedges: &'a WedgesOfVertices,
 }
 
 impl Coloured<'_> {
     fn off(&self, dying: u32, onto: u32) -> f32 {
         let albedo = |w: &u32| unit(self.source.wedges[*w as usize].albedo);
         let least = |w: &u32| {
-            let all = self.wedges[onto as usize].iter().map(|o| albedo(o).distance(albedo(w)));
+            let all = self.wedges.of(onto).iter().map(|o| albedo(o).distance(albedo(w)));
             all.fold(f32::INFINITY, f32::min)
         };
-        self.wedges[dying as usize].iter().map(least).fold(0.0, f32::max)
+        self.wedges.of(dying).iter().map(least).fold(0.0, f32::max)
     }
 }
 
