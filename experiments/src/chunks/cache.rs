@@ -30,6 +30,7 @@ struct State<V> {
     slots: HashMap<u32, Slot<V>>,
     /// Values that nobody uses, by the time of their last use.
     idle: BTreeMap<u64, u32>,
+    idle_bytes: u64,
 }
 
 enum Slot<V> {
@@ -80,11 +81,12 @@ impl<V> Drop for Pin<'_, V> {
         self.value = None;
         HELD.set(HELD.get() - 1);
         let mut state = self.cache.lock();
-        if let Some(Slot::Held { users, used_at, .. }) = state.slots.get_mut(&self.key) {
+        if let Some(Slot::Held { users, used_at, bytes, .. }) = state.slots.get_mut(&self.key) {
             *users -= 1;
             if *users == 0 {
-                let at = *used_at;
+                let (at, bytes) = (*used_at, *bytes);
                 state.idle.insert(at, self.key);
+                state.idle_bytes += bytes;
                 self.cache.changed.notify_all();
             }
         }
@@ -95,7 +97,7 @@ impl<V> Cache<V> {
     /// One that never holds more than `limit_bytes`.
     pub fn new(limit_bytes: u64) -> Self {
         let slots = HashMap::new();
-        let state = State { bytes: 0, peak_bytes: 0, clock: 0, slots, idle: BTreeMap::new() };
+        let state = State { bytes: 0, peak_bytes: 0, clock: 0, slots, idle: BTreeMap::new(), idle_bytes: 0 };
         Self { limit_bytes, state: Mutex::new(state), changed: Condvar::new() }
     }
 
@@ -153,31 +155,25 @@ impl<V> Cache<V> {
         state.peak_bytes = state.peak_bytes.max(state.bytes);
         state.slots.insert(key, Slot::Loading);
         drop(state);
-        let loaded = load();
+        let _loading = Loading { cache: self, key, bytes };
+        let value = load().map_err(CacheError::Load)?;
         let mut state = self.lock();
-        self.changed.notify_all();
-        match loaded {
-            Ok(value) => {
-                state.bytes -= extra_bytes;
-                let slot = Slot::Held { value: Arc::new(value), bytes: held_bytes, users: 0, used_at: 0 };
-                state.slots.insert(key, slot);
-                Ok(self.pin(&mut state, key))
-            }
-            Err(e) => {
-                state.bytes -= bytes;
-                state.slots.remove(&key);
-                Err(CacheError::Load(e))
-            }
-        }
+        state.bytes -= extra_bytes;
+        let slot = Slot::Held { value: Arc::new(value), bytes: held_bytes, users: 0, used_at: 0 };
+        state.slots.insert(key, slot);
+        let pin = self.pin(&mut state, key);
+        drop(state);
+        Ok(pin)
     }
 
     fn pin(&self, state: &mut State<V>, key: u32) -> Pin<'_, V> {
         state.clock += 1;
         let now = state.clock;
         let mut taken = None;
-        if let Some(Slot::Held { value, users, used_at, .. }) = state.slots.get_mut(&key) {
-            if *users == 0 {
-                state.idle.remove(used_at);
+        let State { slots, idle, idle_bytes, .. } = &mut *state;
+        if let Some(Slot::Held { value, users, used_at, bytes }) = slots.get_mut(&key) {
+            if idle.remove(used_at).is_some() {
+                *idle_bytes -= *bytes;
             }
             *users += 1;
             *used_at = now;
@@ -189,8 +185,11 @@ impl<V> Cache<V> {
 }
 
 impl<V> State<V> {
-    /// Drops idle values, the least recently used first, until `bytes` more fit; `false` where they never do.
+    /// Drops idle values, the least recently used first, until `bytes` more fit; `false`, and none is dropped, where they never do.
     fn make_room(&mut self, bytes: u64, limit_bytes: u64) -> bool {
+        if self.bytes - self.idle_bytes + bytes > limit_bytes {
+            return false;
+        }
         while self.bytes + bytes > limit_bytes {
             let Some((_, key)) = self.idle.pop_first() else { return false };
             self.drop_idle(key);
@@ -202,6 +201,26 @@ impl<V> State<V> {
     fn drop_idle(&mut self, key: u32) {
         if let Some(Slot::Held { bytes, .. }) = self.slots.remove(&key) {
             self.bytes -= bytes;
+            self.idle_bytes -= bytes;
         }
+    }
+}
+
+/// A value that is being read: its room and its slot are given back when it did not come, whatever the reason.
+struct Loading<'a, V> {
+    cache: &'a Cache<V>,
+    key: u32,
+    bytes: u64,
+}
+
+impl<V> Drop for Loading<'_, V> {
+    fn drop(&mut self) {
+        let mut state = self.cache.lock();
+        if matches!(state.slots.get(&self.key), Some(Slot::Loading)) {
+            state.slots.remove(&self.key);
+            state.bytes -= self.bytes;
+        }
+        drop(state);
+        self.cache.changed.notify_all();
     }
 }

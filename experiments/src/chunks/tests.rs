@@ -258,6 +258,20 @@ fn the_least_recently_used_goes_first_and_who_holds_does_not_wait() {
 }
 
 #[test]
+fn what_does_not_come_gives_its_room_back_and_what_cannot_fit_drops_nothing() {
+    let cache: Cache<u32> = Cache::new(100);
+    let get = |key, bytes, value: u32| cache.get::<()>(key, bytes, 0, || Ok(value));
+    let panics = || cache.get::<()>(1, 80, 10, || panic!("on purpose")).map(drop);
+    assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(panics)).is_err());
+    assert_eq!(cache.get(1, 80, 10, || Err("no disk")).map(drop).unwrap_err(), CacheError::Load("no disk"));
+    assert_eq!(*get(1, 60, 5).unwrap(), 5);
+    let used = get(1, 60, 6).unwrap();
+    assert_eq!((*used, *get(2, 30, 7).unwrap()), (5, 7));
+    assert_eq!(get(3, 50, 8).map(drop), Err(CacheError::Nested { bytes: 50, limit_bytes: 100 }));
+    assert_eq!(*get(2, 30, 9).unwrap(), 7, "it was let go for what did not fit");
+}
+
+#[test]
 fn contents_are_known_by_their_file_until_it_changes() {
     let dir = tempfile::tempdir().unwrap();
     let store = Store::open(&dir.path().join("store"), Arc::new(|m| panic!("{m}"))).unwrap();

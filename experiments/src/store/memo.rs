@@ -13,7 +13,7 @@ impl StoreMemo {
     /// Of the bake with this key.
     pub fn of(store: &Store, bake: &Key) -> Self {
         let root = store.root.join("unfinished").join(super::hex(bake));
-        Self(Store { root, serial: Default::default(), report: store.report.clone() })
+        Self(Store { root, report: store.report.clone() })
     }
 
     /// Forgets all: the bake is whole.

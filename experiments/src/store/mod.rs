@@ -10,11 +10,12 @@ mod manifest;
 mod memo;
 mod meshes;
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use farfield_core::Fault;
 pub use keys::{Key, key};
@@ -28,11 +29,14 @@ const MAGIC: &[u8; 4] = b"FFB1";
 const HEADER: usize = 4 + 8 + 32;
 /// zstd's own default: the store is written once and read a few times.
 const COMPRESSION: i32 = 3;
+/// Numbers of files written aside by this process, whichever store they are of.
+static SERIAL: AtomicU64 = AtomicU64::new(0);
+/// Where this process has cleared what an earlier one of the same number left aside.
+static CLEARED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// A folder of blocks.
 pub struct Store {
     root: PathBuf,
-    serial: AtomicU64,
     /// Told of damaged blocks.
     report: Arc<dyn Fn(String) + Send + Sync>,
 }
@@ -46,15 +50,21 @@ impl Store {
         fs::create_dir_all(root.join("blocks"))?;
         let aside = root.join("aside");
         fs::create_dir_all(&aside)?;
+        // Opened once more, what has this process's number is being written.
+        let first = CLEARED.lock().unwrap_or_else(PoisonError::into_inner).insert(fs::canonicalize(&aside)?);
+        let alive = |pid: u32| match pid == std::process::id() {
+            true => !first,
+            // Its writer may be another process that is alive.
+            false => Path::new("/proc").join(pid.to_string()).exists(),
+        };
         for file in fs::read_dir(&aside)? {
             let file = file?.path();
             let owner = file.file_name().and_then(|n| n.to_str()?.split('-').next()?.parse::<u32>().ok());
-            // Its writer may be another process that is alive.
-            if owner.is_none_or(|pid| !Path::new("/proc").join(pid.to_string()).exists() || pid == std::process::id()) {
+            if !owner.is_some_and(alive) {
                 _ = fs::remove_file(file);
             }
         }
-        Ok(Self { root: root.to_owned(), serial: AtomicU64::new(0), report })
+        Ok(Self { root: root.to_owned(), report })
     }
 
     /// The folder.
@@ -148,7 +158,7 @@ impl Store {
             return Ok(bytes);
         }
         let packed = zstd::bulk::compress(raw, COMPRESSION)?;
-        let number = self.serial.fetch_add(1, Ordering::Relaxed);
+        let number = SERIAL.fetch_add(1, Ordering::Relaxed);
         let aside = self.root.join("aside").join(format!("{}-{number}", std::process::id()));
         let mut file = File::create(&aside)?;
         let length = (raw.len() as u64).to_le_bytes();

@@ -70,8 +70,13 @@ fn what_a_killed_process_left_aside_goes() {
     // No process has a number this high.
     let left = dir.path().join("aside").join("4194999-3");
     fs::write(&left, b"half").unwrap();
-    drop(store(dir.path()));
+    let (s, _) = store(dir.path());
     assert!(!left.exists());
+    // What this process writes stays when it opens the store once more.
+    let own = s.aside().join(format!("{}-3", std::process::id()));
+    fs::write(&own, b"half").unwrap();
+    drop(store(dir.path()));
+    assert!(own.exists());
 }
 
 #[test]

@@ -555,6 +555,5 @@ fn an_interrupted_bake_goes_on_where_it_was() {
     assert_eq!(held.stored.into_inner().unwrap(), whole.payloads);
     let [made, kept] = held.counted.into_inner().unwrap();
     assert!(made.is_disjoint(&kept) && &made | &kept == all);
-    println!("{} payloads: {} before the interruption, {} of them kept", all.len(), first[0].len(), kept.len());
     assert!(kept.len() * 2 > first[0].len(), "{} of {}", kept.len(), first[0].len());
 }
