@@ -1,5 +1,6 @@
 //! Conformance, parity, golden images, the matrix.
 
+pub mod areas;
 #[cfg(doctest)]
 mod book;
 pub mod conformance;

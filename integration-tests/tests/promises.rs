@@ -35,6 +35,7 @@ use farfield_experiments::results::Summary;
 use farfield_experiments::run::{self, Options};
 use farfield_experiments::walk::Opened;
 use farfield_far_hlod::{Promise, promises};
+use farfield_integration_tests::areas::Areas;
 use farfield_integration_tests::lab::{Lab, backends, models};
 use glam::{DVec3, Vec2, Vec3};
 use rand::{Rng, RngExt, SeedableRng};
@@ -104,31 +105,6 @@ impl Sought {
         self.vertices += 1;
         self.beyond += usize::from(off > promised);
         self.most = self.most.max(off / promised);
-    }
-}
-
-/// Triangles with the sums of their areas.
-struct Areas {
-    triangles: Vec<[Vec3; 3]>,
-    sums: Vec<f64>,
-}
-
-impl Areas {
-    fn new(triangles: Vec<[Vec3; 3]>) -> Self {
-        let mut sum = 0.0;
-        let area = |[a, b, c]: &[Vec3; 3]| f64::from((*b - *a).cross(*c - *a).length());
-        let sums = triangles.iter().map(|t| {
-            sum += area(t);
-            sum
-        });
-        Self { sums: sums.collect(), triangles }
-    }
-
-    fn point(&self, rng: &mut impl Rng) -> Vec3 {
-        let at = rng.random_range(0.0..1.0) * self.sums.last().unwrap();
-        let [a, b, c] = self.triangles[self.sums.partition_point(|&s| s <= at).min(self.sums.len() - 1)];
-        let (s, t): (f32, f32) = (rng.random_range(0.0..1f32).sqrt(), rng.random_range(0.0..1.0));
-        a * (1.0 - s) + (b * (1.0 - t) + c * t) * s
     }
 }
 
@@ -214,8 +190,8 @@ impl<'a> Tree<'a> {
         for _ in 0..samples {
             let vertex = original.positions[rng.random_range(0..original.positions.len())];
             far.extend([own.point(rng), vertex].map(|p| there.nearest(p).unwrap().distance));
-            if !drawn.triangles.is_empty() {
-                let corner = drawn.triangles[rng.random_range(0..drawn.triangles.len())][0];
+            if !drawn.triangles().is_empty() {
+                let corner = drawn.triangles()[rng.random_range(0..drawn.triangles().len())][0];
                 far.extend([drawn.point(rng), corner].map(|p| back.nearest(p).unwrap().distance));
             }
             if !splats.is_empty() {

@@ -7,10 +7,11 @@ use farfield_core::bvh::TriangleBvh;
 use farfield_core::collapse::{LiveMesh, Mode, Settings, collapse};
 use farfield_core::scene::{Gathered, Scene, gather};
 use farfield_core::strategy::{MeshView, SimplificationMetric, VertexSeen};
+use farfield_integration_tests::areas::Areas;
 use farfield_integration_tests::lab::{Lab, models};
 use farfield_metrics::{Appearance, Hausdorff};
 use glam::{DVec3, Vec3};
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 /// Points on each surface.
@@ -31,20 +32,9 @@ fn welded(scene: &Scene) -> (Gathered, Vec<u32>, Vec<Vec3>, Vec<[u8; 4]>) {
 /// The largest distance of random points of one surface, spread by area, from another.
 fn sampled(positions: &[Vec3], from: &[u32], to: &[u32], rng: &mut ChaCha8Rng) -> f32 {
     let bvh = TriangleBvh::build(positions, to);
-    let corners = |t: usize| [0, 1, 2].map(|k| positions[from[3 * t + k] as usize]);
-    let mut sums = vec![0f64];
-    for t in 0..from.len() / 3 {
-        let [a, b, c] = corners(t);
-        sums.push(sums[t] + f64::from((b - a).cross(c - a).length()));
-    }
-    let total = *sums.last().unwrap();
-    let point = |rng: &mut ChaCha8Rng| {
-        let at = rng.random_range(0.0..total);
-        let [a, b, c] = corners(sums.partition_point(|&s| s <= at).clamp(1, from.len() / 3) - 1);
-        let (s, t): (f32, f32) = (rng.random_range(0.0..1f32).sqrt(), rng.random_range(0.0..1.0));
-        a * (1.0 - s) + (b * (1.0 - t) + c * t) * s
-    };
-    let points: Vec<Vec3> = (0..SAMPLES).map(|_| point(rng)).collect();
+    let corners = from.as_chunks::<3>().0.iter().map(|t| t.map(|v| positions[v as usize]));
+    let areas = Areas::new(corners.collect());
+    let points: Vec<Vec3> = (0..SAMPLES).map(|_| areas.point(rng)).collect();
     points.iter().map(|&p| bvh.closest_point(p, f32::INFINITY).unwrap().distance).fold(0.0, f32::max)
 }
 

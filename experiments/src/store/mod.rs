@@ -176,7 +176,8 @@ impl Store {
     }
 }
 
-fn hex(key: &Key) -> String {
+/// A key as files are named.
+pub(crate) fn hex(key: &Key) -> String {
     key.iter().map(|b| format!("{b:02x}")).collect()
 }
 

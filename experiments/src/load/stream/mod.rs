@@ -37,7 +37,7 @@ use super::sink::Corner;
 use super::texture::Textures;
 use super::{LoadError, LoadOptions, folder, gltf, obj, ply, root};
 use crate::chunks::{ChunkFile, Kept, Writer, identity};
-use crate::store::{Store, key};
+use crate::store::{Store, hex, key};
 
 /// Part of every chunk file's key: other rules of reading or cutting are another version.
 const VERSION: &[u8] = b"1";
@@ -171,7 +171,7 @@ pub fn open(path: &Path, options: &LoadOptions, keep: &Keep<'_>) -> Result<Strea
     let parts: Vec<&[u8]> = std::iter::once(VERSION).chain(digests.iter().map(<[u8; 32]>::as_slice)).collect();
     let name = key("chunks", &parts);
     let home = keep.store.root().join("scenes");
-    let home = home.join(name.iter().map(|b| format!("{b:02x}")).collect::<String>() + ".chunks");
+    let home = home.join(hex(&name) + ".chunks");
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
     let known = home.exists().then(|| ChunkFile::open(&home, keep.memory_bytes));
     let file = match known {
